@@ -1,4 +1,4 @@
-"""Engines paint the pictures of shots: one module an engine, with a `viewsphere.plugins.engine.EngineSpec`."""
+"""Engines paint the pictures of shots: one module per engine, with a `viewsphere.plugins.engine.EngineSpec`."""
 
 from __future__ import annotations
 
@@ -15,23 +15,25 @@ if TYPE_CHECKING:
 
 
 class Stage(Protocol):
-    """The scene that an engine builds for a shot and reuses while time and camera move; instants and sensors count from 0."""
+    """The scene that an engine builds for a shot and reuses while time passes and the camera moves; instants and sensors count
+    from 0.
+    """
 
     def at(self, instant: int) -> Geometry:
         """The world-space triangles at an instant."""
         ...
 
     def paint(self, instant: int, sensor: int, visibility: Visibility, names: Collection[str]) -> dict[str, NDArray[Any]]:
-        """The named passes (`model.channel.PASSES`) of a sensor at an instant, of those that the engine's spec lists;
+        """The named passes (`model.channel.PASSES`) of a sensor at an instant, limited to those that the engine's spec lists;
         `visibility` is truth's buffer of `at(instant)`.
 
-        `rgb` is (H, W, 3) uint8 sRGB; `rgba` (H, W, 4) with straight alpha and no background: black where nothing is seen.
-        Laid over a plain background, it equals the `rgb` with that background. All others are float32, (H, W, 3) or (H, W), of
-        the shutter's centre and a pinhole as labels are, and without the finish. Where the picture shows the sky, `residual`
-        does, too.
+        `rgb` is (H, W, 3) uint8 sRGB; `rgba` is (H, W, 4) with straight alpha and no background: black if nothing is visible.
+        Laid over a plain background, `rgba` equals the `rgb` with that background. All others are float32, (H, W, 3) or (H, W).
+        Like labels, they are for the middle of the exposure and a pinhole, and they are without the finish. `residual` includes
+        the sky if the picture does.
         """
         ...
 
     def of(self, shot: Shot) -> Self:
-        """A stage for another shot of an equal `stage_key`, which reuses everything built for things that stand still."""
+        """A stage for another shot with an equal `stage_key`, which reuses everything built for still things."""
         ...

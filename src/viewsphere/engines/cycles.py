@@ -1,4 +1,4 @@
-"""cycles: path-traced pictures by Blender's Cycles, which runs in a process of its own; labels are the same as raster's."""
+"""cycles: pictures path-traced by Blender's Cycles, which runs in its own process; labels are the same as raster's."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 def check(options: Mapping[str, JsonValue]) -> None:
-    """Raise UserError for an option that is not known (with the nearest name), out of range, or without a Blender."""
+    """Raise UserError for an unknown option (with the nearest name), a value out of range, or a missing Blender."""
     _blender.check(options, "cycles")
 
 

@@ -1,4 +1,6 @@
-"""eevee: pictures drawn by Blender's EEVEE, through OpenGL; labels, and all but the drawing, are those of `cycles`."""
+"""eevee: pictures drawn by Blender's EEVEE through OpenGL; labels, and everything except the drawing, are the same as for
+`cycles`.
+"""
 
 from __future__ import annotations
 
@@ -14,7 +16,7 @@ if TYPE_CHECKING:
 
 
 def check(options: Mapping[str, JsonValue]) -> None:
-    """Raise UserError for an option that is not known (with the nearest name), out of range, or without a Blender."""
+    """Raise UserError for an unknown option (with the nearest name), a value out of range, or a missing Blender."""
     _blender.check(options, "eevee")
 
 

@@ -1,4 +1,4 @@
-"""workbench: plain pictures drawn by Blender's Workbench, through OpenGL; labels are those of all engines."""
+"""workbench: plain pictures drawn by Blender's Workbench through OpenGL; labels are the same as for all engines."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 
 def check(options: Mapping[str, JsonValue]) -> None:
-    """Raise UserError for an option that is not known (with the nearest name), out of range, or without a Blender."""
+    """Raise UserError for an unknown option (with the nearest name), a value out of range, or a missing Blender."""
     _blender.check(options, "workbench")
 
 

@@ -1,4 +1,4 @@
-"""The 2D boxes of what a camera projects: half-open pixel corners (x0, y0, x1, y1)."""
+"""The 2D boxes of projected geometry: half-open pixel corners (x0, y0, x1, y1)."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from viewsphere.geometry.lenses import NEAR, Bounds, Camera
 Float = NDArray[np.float64]
 
 ROUNDING = 1e-9
-"""By how much, in metres a metre, a sum of coordinates may miss the depth that it stands for: generously."""
+"""Rounding error of a sum of coordinates, in metres per metre; a generous upper bound."""
 
 
 def clip_to_image(bounds: Bounds, width: int, height: int) -> Bounds | None:
@@ -27,8 +27,7 @@ def overlap(a: Bounds, b: Bounds) -> bool:
 
 
 def is_behind(camera: Camera, bounds: Float) -> bool:
-    """Return whether nothing in a box in the world, its lowest and its highest corner (2, 3), is in front of a pinhole's z =
-    NEAR.
+    """Return whether a world box (2, 3), given by its lowest and highest corners, has no part in front of a pinhole's z = NEAR.
     """
     terms = camera.R[2] * bounds
     farthest = float(terms.max(axis=0).sum() + camera.t[2])
@@ -38,8 +37,10 @@ def is_behind(camera: Camera, bounds: Float) -> bool:
 def projected_bounds(
     camera: Camera, vertices: Float, triangles: NDArray[np.int32], is_used: NDArray[np.bool_] | None = None
 ) -> tuple[Bounds | None, bool]:
-    """The 2D box (x0, y0, x1, y1) in pixels of triangles (n, 3) whose corners are world vertices (v, 3), None if the camera
-    sees none of them; and whether it sees all. `is_used`, if given: a mask of the vertices that triangles use.
+    """The 2D box (x0, y0, x1, y1) in pixels of triangles (n, 3), and whether the camera sees all of them.
+
+    `vertices` (v, 3) are the corners in the world; `is_used`, if given, masks the vertices that triangles use. The box is None
+    if the camera sees no triangle.
     """
     if not len(triangles):
         return None, True

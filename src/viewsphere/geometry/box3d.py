@@ -1,4 +1,4 @@
-"""A 3D box, which alone depends on the order of its eight corners.
+"""A 3D box. Only this module depends on the order of its eight corners.
 
 Object axes: front -Y, up +Z; left (+X) and right (-X) are the object's own sides.
 """
@@ -44,18 +44,18 @@ _EDGES = ((0, 1), (1, 2), (2, 3), (3, 0), (4, 5), (5, 6), (6, 7), (7, 4), (0, 4)
 
 @dataclass(frozen=True, eq=False)
 class Box3d:
-    """The eight corners of a box, (8, 3) metres in any axes, or (8, 2) as a camera shows them, in the order of labels."""
+    """The eight corners of a box in the order of labels: (8, 3) metres in any axes, or (8, 2) as projected by a camera."""
 
     corners: Array
 
     @classmethod
     def between(cls, low: ArrayLike, high: ArrayLike) -> Self:
-        """The box along the axes between its lowest and its highest corner."""
+        """The axis-aligned box between its lowest and its highest corner."""
         return cls(np.where(np.array(_SIDES) > 0, np.asarray(high, np.float64), np.asarray(low, np.float64)))
 
     @classmethod
     def around(cls, points: Array) -> Self:
-        """The box along the axes around points (N, 3)."""
+        """The axis-aligned box around points (N, 3)."""
         return cls.between(points.min(axis=0), points.max(axis=0))
 
     @property
@@ -80,13 +80,13 @@ class Box3d:
 
     @property
     def size(self) -> tuple[float, float, float]:
-        """Width along X, height along Z and length along Y of a box along the axes."""
+        """The width along X, height along Z and length along Y of an axis-aligned box."""
         x, y, z = self.diagonal.tolist()
         return x, z, y
 
     @property
     def faces(self) -> dict[str, Array]:
-        """The four corners of each face in turn, (4, 3), by name: bottom, top, right, front, left, back."""
+        """The corners (4, 3) of each face, in order around it, by name: bottom, top, right, front, left, back."""
         return {name: self.corners[list(corners)] for name, corners in _FACES.items()}
 
     @property
@@ -105,5 +105,5 @@ class Box3d:
 
     @staticmethod
     def layout() -> dict[str, Any]:
-        """Faces and edges by the numbers of corners, and the side of each corner, for viewers that have corners alone."""
+        """Faces and edges as corner numbers, and the side of each corner, for viewers that have only the corners."""
         return {"faces": _FACES, "edges": _EDGES, "signs": _SIDES}

@@ -21,7 +21,7 @@ Float = NDArray[np.float64]
 def orbit_center(azimuth: float, elevation: float, distance: float) -> Float:
     """Camera centre relative to the target, (3,) metres; angles in radians.
 
-    At azimuth 0 the camera stands on -Y and looks along +Y, the rig of Ruiz et al. 2019 and of PASCAL3D+.
+    At azimuth 0 the camera is on -Y and looks along +Y, the rig of Ruiz et al. 2019 and of PASCAL3D+.
     """
     ca, sa, ce, se = math.cos(azimuth), math.sin(azimuth), math.cos(elevation), math.sin(elevation)
     return distance * np.array([ce * sa, -ce * ca, se])
@@ -30,7 +30,8 @@ def orbit_center(azimuth: float, elevation: float, distance: float) -> Float:
 def orbit_rotation(azimuth: float, elevation: float, tilt: float = 0.0) -> Float:
     """World-to-camera rotation (3, 3); angles in radians.
 
-    No look-at: elevation 90 degrees is well defined. A positive tilt rolls the camera clockwise seen from behind it.
+    It does not use a look-at, so elevation 90 degrees is well defined. A positive tilt rolls the camera clockwise seen from
+    behind it.
     """
     ca, sa, ce, se = math.cos(azimuth), math.sin(azimuth), math.cos(elevation), math.sin(elevation)
     level = np.array([[ca, sa, 0.0], [se * sa, -se * ca, -ce], [-ce * sa, ce * ca, -se]])
@@ -41,7 +42,7 @@ def orbit_rotation(azimuth: float, elevation: float, tilt: float = 0.0) -> Float
 
 
 def orbit_angles(rotation: ArrayLike) -> tuple[float, float, float]:
-    """Azimuth, elevation and tilt, radians, whose `orbit_rotation` is this world-to-camera rotation (3, 3).
+    """The azimuth, elevation and tilt, in radians, that `orbit_rotation` turns into this world-to-camera rotation (3, 3).
 
     Straight above and below, where only the sum or difference of azimuth and tilt is defined, tilt is 0.
     """
@@ -58,7 +59,8 @@ def orbit_angles(rotation: ArrayLike) -> tuple[float, float, float]:
 
 
 def focal_from_sensor(focal: float, sensor: float, extent: float) -> float:
-    """Focal length in pixels from the lens' focal length and the sensor's size along `extent` pixels (any one unit)."""
+    """Focal length in pixels from the lens' focal length and the sensor's size along `extent` pixels (both in the same unit).
+    """
     return focal / sensor * extent
 
 
@@ -80,7 +82,7 @@ def pixel_rays(intrinsics: Intrinsics, subdivision: int = 1, window: Window | No
 
 
 def project(intrinsics: Intrinsics, points: ArrayLike) -> tuple[Float, NDArray[np.bool_]]:
-    """Positions in the picture of points (..., 3) in camera axes, and whether the lens shows them, as
+    """Picture positions of points (..., 3) in camera axes, and whether the lens shows them; see
     `viewsphere.geometry.lenses.Lens.project`.
     """
     return intrinsics.lens.project(points)

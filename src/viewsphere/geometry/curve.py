@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 Float = NDArray[np.float64]
 
 PIECES = 16
-"""Pieces that each span between two points is measured in."""
+"""Number of pieces into which each span is divided to measure its length."""
 
 NODES = np.array([-0.9602898564975363, -0.7966664774136267, -0.5255324099163290, -0.1834346424956498])
 WEIGHTS = np.array([0.1012285362903763, 0.2223810344533745, 0.3137066458778873, 0.3626837833783620])
@@ -20,16 +20,16 @@ Stegun 1964, table 25.4. Written out, because computed nodes differ in their las
 """
 
 STEPS = 12
-"""Most steps of Newton's method from a length to the place on a piece; mostly two are made."""
+"""Maximum number of Newton steps from a length to its place on a piece; two are usually enough."""
 
 CLOSE = 1e-14
-"""Share of a curve's length that a length may be missed by."""
+"""Tolerance of a length, as a share of the curve's length."""
 
 
 @dataclass(frozen=True, eq=False)
 class Curve:
-    """A curve of cubic spans. `knots` (N,) are the lengths at which it passes its points; of a closed curve, the last is the
-    length at which it meets the first point again.
+    """A curve of cubic spans. `knots` (N,) are the lengths at its points. For a closed curve, the last knot is the length at
+    which the curve meets its first point again.
 
     Span i is `cubics[i]` (4, D), coefficients of 1, u, u^2, u^3 for u of 0 to 1; `pieces[i]` (PIECES + 1,) are the lengths at
     equal steps of u.
@@ -46,19 +46,21 @@ class Curve:
 
     @property
     def knots(self) -> Float:
-        """Lengths (N,) at which it passes its points."""
+        """Lengths (N,) at which the curve passes its points."""
         return np.append(self.pieces[:, 0], self.length)
 
     def at(self, length: ArrayLike) -> Float:
-        """Points (..., D) at these lengths (...): beyond an open curve its end, and once more around a closed one."""
+        """Points (..., D) at these lengths (...). Lengths beyond the end of an open curve give the end; on a closed curve they
+        wrap around.
+        """
         return self.along(length)[0]
 
     def direction(self, length: ArrayLike) -> Float:
-        """Unit vectors (..., D) along the curve at these lengths (...), as `at` counts them."""
+        """Unit vectors (..., D) along the curve at these lengths (...), which are interpreted as in `at`."""
         return self.along(length)[1]
 
     def along(self, length: ArrayLike) -> tuple[Float, Float]:
-        """Points and unit vectors along the curve, (..., D) each, at these lengths (...), as `at` counts them."""
+        """Points and unit vectors along the curve, (..., D) each, at these lengths (...), which are interpreted as in `at`."""
         span, u = self._found(length)
         c, slope = self.cubics[span], _slope(self.cubics[span], u)
         u = u[..., None]
@@ -75,7 +77,7 @@ class Curve:
         return span, self._solved(span, step / PIECES, s - starts[piece], self.pieces[span, step + 1] - starts[piece])
 
     def _solved(self, span: NDArray[np.intp], begin: Float, rest: Float, whole: Float) -> Float:
-        """u of what is `rest` after u = `begin`, in a piece `whole` long, by Newton's method kept within the piece."""
+        """The u at length `rest` after u = `begin` in a piece of length `whole`, by Newton's method restricted to the piece."""
         cubics = self.cubics[span]
         u = begin + rest / whole / PIECES
         for _ in range(STEPS):
@@ -89,9 +91,9 @@ class Curve:
 def spline(points: ArrayLike, closed: bool = False) -> Curve:
     """The centripetal Catmull-Rom curve through points (N, D), N >= 2 (3 where closed): no loops, no cusps between points.
 
-    Barry and Goldman 1988; Yuksel, Schaefer and Keyser 2011 on the centripetal knots, |p[i+1] - p[i]| ** 0.5. An open curve
-    is led in and out by its first and last points' neighbours, mirrored. Raises ValueError for fewer points, and for two
-    neighbours at one place.
+    Barry and Goldman 1988; Yuksel, Schaefer and Keyser 2011 for the centripetal knots, |p[i+1] - p[i]| ** 0.5. The ends of an
+    open curve use the mirrored neighbours of its first and last points. Raises ValueError for fewer points, or if two
+    neighbours coincide.
     """
     p = np.asarray(points, np.float64)
     least = 3 if closed else 2

@@ -8,19 +8,19 @@ from numpy.typing import NDArray
 Float = NDArray[np.float64]
 
 MANY = 64
-"""Points from which on those in the middle are left out first."""
+"""Number of points above which interior points are removed first."""
 
 DIRECTIONS = (
     *((1, 0), (3, 1), (2, 2), (1, 3), (0, 1), (-1, 3), (-2, 2), (-3, 1)),
     *((-1, 0), (-3, -1), (-2, -2), (-1, -3), (0, -1), (1, -3), (2, -2), (3, -1)),
 )
-"""In the turn from x to y."""
+"""Directions, ordered from x to y."""
 
 
 def convex_hull(points: Float) -> Float:
-    """The corners (K, 2) of the convex hull of points (N, 2), in the turn from x to y, clockwise as seen where y points down.
-    The first corner has the lowest x, and of these the lowest y; none lies on a side. One point where all points are one,
-    the two ends where they lie on a line.
+    """The corners (K, 2) of the convex hull of points (N, 2), ordered from x to y, which is clockwise as seen if y points down.
+    The first corner has the lowest x, then the lowest y; no corner is inside a side. If all points coincide, the result is that
+    point; if they are on a line, its two ends.
 
     By A. M. Andrew, Another efficient algorithm for convex hulls in two dimensions, Information Processing Letters 9 (1979).
     """
@@ -32,8 +32,8 @@ def convex_hull(points: Float) -> Float:
 
 
 def _outer(points: Float) -> Float:
-    """The points without most of those that cannot be corners: those within the polygon of the farthest ones in a few
-    directions (S. Akl and G. Toussaint, A fast convex hull algorithm, Information Processing Letters 7 (1978)).
+    """The points without most of those that cannot be corners: points inside the polygon of the farthest points in a few
+    directions are removed (S. Akl and G. Toussaint, A fast convex hull algorithm, Information Processing Letters 7 (1978)).
     """
     if len(points) <= MANY:
         return points
@@ -62,11 +62,11 @@ def _turn(a: tuple[float, float], b: tuple[float, float], c: tuple[float, float]
 
 
 def smallest_rectangle(hull: Float) -> Float:
-    """The corners (4, 2) of the rectangle of least area around a convex hull (K, 2), in the hull's turn, from the one with the
-    lowest y, of these with the lowest x.
+    """The corners (4, 2) of the rectangle of least area around a convex hull (K, 2), in the hull's order. The first corner has
+    the lowest y, then the lowest x.
 
     One side lies along a side of the hull (H. Freeman and R. Shapira, Determining the minimum-area encasing rectangle for an
-    arbitrary closed curve, CACM 18 (1975)); of equal ones that along the first such side is taken.
+    arbitrary closed curve, CACM 18 (1975)); among rectangles of equal area, the one along the first such side is chosen.
     """
     sides = np.roll(hull, -1, axis=0) - hull
     lengths = np.hypot(*sides.T)
@@ -83,11 +83,11 @@ def smallest_rectangle(hull: Float) -> Float:
 
 
 EQUAL = 1e-12
-"""Share by which areas may differ that count as equal."""
+"""Relative difference up to which areas count as equal."""
 
 
 def mask_outline(part: NDArray[np.bool_], x0: int = 0, y0: int = 0) -> Float:
-    """Pixel corners (N, 2) of a mask's outermost pixels, row by row: what its convex hull is made of. `part` (h, w) begins at
+    """Pixel corners (N, 2) of a mask's outermost pixels, row by row: the input for its convex hull. `part` (h, w) begins at
     column x0, row y0.
     """
     rows = np.flatnonzero(part.any(axis=1))

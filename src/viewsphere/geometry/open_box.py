@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 THICKNESS = 0.05
-"""Of a board, as a share of the box's shortest side."""
+"""Thickness of a board, as a share of the box's shortest side."""
 
 
 def boards(width: float, height: float, length: float) -> list[tuple[tuple[float, float, float], tuple[float, float, float]]]:
-    """Middle and size of each of the five boards of a box of this size outside, metres: the bottom first. On z = 0."""
+    """Centre and size of each of the five boards of a box with these outer dimensions, in metres. The bottom is first, and
+    rests on z = 0.
+    """
     t = THICKNESS * min(width, height, length)
     tall, z = height - t, t + (height - t) / 2
     return [

@@ -11,11 +11,11 @@ SIDES = ("front", "front-left", "left", "back-left", "back", "back-right", "righ
 def pose_category(azimuth_deg: float, elevation_deg: float, resolution_deg: float = 45.0) -> str:
     """The bin of a viewpoint: `front`, `front-left`, ..., `top`.
 
-    The bin is `top` from 60 degrees up and `bottom` from -60 down, whatever the azimuth. Between, azimuth sectors
-    of `resolution_deg` are centred on 0: at 45 the eight `SIDES`, at 90 every second of them, else the
-    sector's centre as `az030` (`az022.5`). Elevations of [30, 60) add `-above`, of (-60, -30) `-below`. A
-    sector includes its lower limit. Angles are rounded to 1e-6 degrees first, so that the limits do not depend
-    on the last digit. Raises ValueError for a resolution that does not divide 360.
+    The bin is `top` from 60 degrees up and `bottom` from -60 down, whatever the azimuth. In between, azimuth sectors of
+    `resolution_deg` start with one centred on 0. At 45 degrees they are the eight `SIDES`, at 90 every second side. Otherwise
+    they are named by their centre, as in `az030` (`az022.5`). Elevations of [30, 60) add `-above`, of (-60, -30) `-below`. A
+    sector includes its lower limit. Angles are rounded to 1e-6 degrees first, so that the limits do not depend on the last
+    digit. Raises ValueError for a resolution that does not divide 360.
     """
     sectors = round(360 / resolution_deg) if resolution_deg > 0 else 0
     if sectors < 1 or not math.isclose(sectors * resolution_deg, 360):

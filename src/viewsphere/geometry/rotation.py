@@ -58,8 +58,8 @@ def quaternion_from_matrix(matrix: ArrayLike) -> tuple[float, float, float, floa
 
 
 def random_rotation(rng: np.random.Generator) -> Float:
-    """A rotation (3, 3), uniform over all: a quaternion of four numbers in the unit ball, by rejection. Sines and logarithms,
-    whose last digits differ between processors, are not asked for.
+    """A rotation (3, 3), uniform over all rotations: a quaternion of four numbers in the unit ball, drawn by rejection. Sines
+    and logarithms are avoided, because their last digits differ between processors.
     """
     while True:
         quaternion = 2 * rng.random(4) - 1
@@ -95,8 +95,8 @@ def quaternion_product(a: ArrayLike, b: ArrayLike) -> Float:
 
 
 def rotation_vector(matrix: ArrayLike) -> Float:
-    """The vector (3,) about which a rotation (3, 3) turns, counterclockwise seen from its tip, as long as the angle, at most pi
-    radians; rounded to 1e-12, because the last digits of angles differ between processors.
+    """The rotation vector (3,) of a rotation (3, 3): its axis times the angle, at most pi radians, counterclockwise seen from
+    its tip. It is rounded to 1e-12, because the last digits of angles differ between processors.
     """
     w, x, y, z = quaternion_from_matrix(matrix)
     sine = math.sqrt(x * x + y * y + z * z)
@@ -105,8 +105,8 @@ def rotation_vector(matrix: ArrayLike) -> Float:
 
 
 def slerp(start: ArrayLike, end: ArrayLike, share: float) -> Float:
-    """The unit quaternion (4,) at a share of the way from one unit quaternion (w, x, y, z) to another, the shorter way around:
-    the angle turned grows evenly with the share. Shoemake 1985.
+    """The unit quaternion (4,) at a share of the shorter way from one unit quaternion (w, x, y, z) to another. The angle grows
+    linearly with the share. Shoemake 1985.
     """
     a, b = np.asarray(start, np.float64), np.asarray(end, np.float64)
     if float((a * b).sum()) < 0:
@@ -119,7 +119,7 @@ def slerp(start: ArrayLike, end: ArrayLike, share: float) -> Float:
 
 
 def _is_rotation(rows: list[list[float]]) -> bool:
-    """Return whether the rows are right-handed and orthonormal, about."""
+    """Return whether the rows are approximately right-handed and orthonormal."""
     a, b, c = rows
     lengths = all(abs(_dot(row, row) - 1) <= ROTATION_TOLERANCE for row in rows)
     angles = all(abs(_dot(one, other)) <= ROTATION_TOLERANCE for one, other in ((a, b), (b, c), (c, a)))
@@ -134,7 +134,7 @@ def _dot(a: Sequence[float], b: Sequence[float]) -> float:
 def transform(matrix: ArrayLike, points: ArrayLike) -> Float:
     """Points (..., 3) moved by the first three rows of a (3 or 4, 4) matrix, or turned by a (3, 3) matrix.
 
-    Written out, because BLAS rounds differently from processor to processor.
+    The products are written out, because BLAS rounds differently from processor to processor.
     """
     m, p = np.asarray(matrix, np.float64), np.asarray(points, np.float64)
     columns = m[:3].T.reshape(m.shape[1], 3, *[1] * (p.ndim - 1))

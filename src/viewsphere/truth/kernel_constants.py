@@ -1,14 +1,14 @@
-"""Numbers that kernels and their callers share; importing them compiles nothing and loads no numba."""
+"""Numbers shared by kernels and their callers; importing them compiles nothing and does not load numba."""
 
 from __future__ import annotations
 
 FOUR = 4
-"""Pixels that kernels look at together."""
+"""Number of pixels that kernels process together."""
 
 NEARER = 1.0 + 2.0**-22
 """Factor by which 1/z of a surface must exceed that of the surface seen so far to replace it; surfaces closer to each other
-count as lying in one place. Its excess over 1 is four times the rounding of the models' float32 coordinates, which split one
-plane into two, and of float32 depth.
+count as coincident. Its excess over 1 is four times the rounding of the models' float32 coordinates, which split one plane into
+two, and of float32 depth.
 """
 
 STILL, RIGID, OTHER, GONE = 0, 1, 2, 3

@@ -1,4 +1,4 @@
-"""Geometries of one scene at one instant after another: what moves is written in place, what stands still is shared."""
+"""The geometries of one scene at successive instants: moving coordinates are overwritten in place, the rest is shared."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from viewsphere.model.thing import Thing
 from viewsphere.truth.raster.geometry import Geometry, build_geometry, lay_ground, moved, present
 
 ROOMS = 3
-"""Instants whose geometries are there at once: a picture's own, the one before and the one after."""
+"""Number of instants whose geometries exist at once: those of a picture, the one before and the one after."""
 
 KEPT = (
     *("triangles", "triangle_material", "triangle_part", "triangle_body_part"),
@@ -26,12 +26,12 @@ KEPT = (
 """Attributes that a mesh shares with its deformed copies."""
 
 SLACK = 1e-6
-"""By how much, in metres beside the height itself, a box that is turned may be higher than what is in it: rounding."""
+"""Rounding error, in metres and relative to the height, by which a rotated box may be higher than its content."""
 
 
 @dataclass(frozen=True, eq=False)
 class _Room:
-    """A geometry, and what it was made for."""
+    """A geometry, and the things and meshes it was made for."""
 
     things: Sequence[Thing]
     meshes: Sequence[Mesh]
@@ -39,11 +39,11 @@ class _Room:
     geometry: Geometry
 
     def changed(self, things: Sequence[Thing], meshes: Sequence[Mesh]) -> list[int]:
-        """Return the indices of the things that are elsewhere, or deformed."""
+        """Return the indices of the things that have moved or deformed."""
         return changed(self.things, self.meshes, things, meshes)
 
     def fits(self, things: Sequence[Thing], meshes: Sequence[Mesh]) -> bool:
-        """Return whether these are the same things, there or not there as before, made of the same triangles."""
+        """Return whether these are the same things, equally present or absent, made of the same triangles."""
         held = zip(self.things, self.meshes, things, meshes, strict=True)
         return all(
             (a is b and mesh is other) or (a.is_there == b.is_there and differs_in_shape_only(mesh, other))
@@ -53,11 +53,11 @@ class _Room:
 
 @dataclass(frozen=True, eq=False)
 class Ring:
-    """Gives the geometries of one scene's things, which are the same but for where they are, and for how their meshes are
-    deformed. Coordinates of a geometry are written to again when those of three other instants were asked for since, and
-    which way all faces when another instant's is asked for (`geometry.Facing`).
+    """Gives the geometries of one scene's things, which differ only in poses and in the deformation of meshes. A geometry's
+    coordinates are overwritten after those of three other instants were requested. Its normals are overwritten when those of
+    another instant are requested (`geometry.Facing`).
 
-    `ground`, `label_alpha` and `keeps_scenery`: see `build_geometry`, to whose result all are equal to the bit.
+    For `ground`, `label_alpha` and `keeps_scenery`, see `build_geometry`; all geometries are bitwise equal to its result.
     """
 
     ground: bool
@@ -67,19 +67,21 @@ class Ring:
     _passing: list[_Room] = field(default_factory=list[_Room])
 
     def at(self, things: Sequence[Thing], meshes: Sequence[Mesh], floor: Floor | None = None) -> Geometry:
-        """The geometry of these still things; `meshes[i]` is that of `things[i]` at this instant, whether it is there or not.
+        """The geometry of these still things; `meshes[i]` is the mesh of `things[i]` at this instant, even if the thing is
+        absent.
 
-        The same object again where nothing moved. Where a thing comes or goes, or has other triangles, all is built anew.
+        The same object is returned if nothing moved. If a thing appears, disappears or has other triangles, the geometry is
+        rebuilt.
         """
         room = self._held(things, meshes, floor)
         if room is None:
             fitting = [room for room in self._rooms if room.fits(things, meshes)]
             room = self._made(things, meshes, floor, fitting, self._rooms.pop(0) if len(self._rooms) == ROOMS else None)
-        self._rooms.append(room)  # the last asked for comes last
+        self._rooms.append(room)  # the most recently requested comes last
         return room.geometry
 
     def passing(self, things: Sequence[Thing], meshes: Sequence[Mesh], floor: Floor | None = None) -> Geometry:
-        """The same between two instants: the arrays are written to again by the next call of this."""
+        """The geometry between two instants; its arrays are overwritten by the next call of this method."""
         fitting = [room for room in (*self._passing, *self._rooms) if room.fits(things, meshes)]
         room = self._made(things, meshes, floor, fitting, self._passing.pop() if self._passing else None)
         self._passing.append(room)
@@ -99,7 +101,7 @@ class Ring:
         fitting: list[_Room],
         free: _Room | None,
     ) -> _Room:
-        """Made of one of the fitting rooms, of the free one if it is the first of them, whose coordinates are written over."""
+        """A geometry made from a fitting room. If the first fitting room is the free one, its coordinates are overwritten."""
         if not fitting:
             geometry = build_geometry(things, present(things, meshes), self.ground, self.label_alpha, floor, self.keeps_scenery)
             return _Room(things, meshes, floor, geometry)
@@ -114,12 +116,12 @@ class Ring:
 
 
 def changed(before: Sequence[Thing], own: Sequence[Mesh], now: Sequence[Thing], meshes: Sequence[Mesh]) -> list[int]:
-    """Return the indices of the same still things that are elsewhere now, or have other meshes."""
+    """Return the indices of the still things that have moved, or have other meshes, between two lists of the same things."""
     return list(changes(before, own, now, meshes))
 
 
 def changes(before: Sequence[Thing], own: Sequence[Mesh], now: Sequence[Thing], meshes: Sequence[Mesh]) -> Iterator[int]:
-    """`changed`, one after another: whether anything is elsewhere is known by the first."""
+    """The indices of `changed`, one at a time, so the first one already shows that something changed."""
     if before is now and own is meshes:
         return
     for i, (a, m, b, n) in enumerate(zip(before, own, now, meshes, strict=True)):
@@ -128,7 +130,7 @@ def changes(before: Sequence[Thing], own: Sequence[Mesh], now: Sequence[Thing], 
 
 
 def differs_in_shape_only(a: Mesh, b: Mesh) -> bool:
-    """Return whether meshes differ in where their vertices are, and in their normals, at most."""
+    """Return whether meshes differ at most in the places of their vertices and in their normals."""
     return a is b or all(_is_same(getattr(a, name), getattr(b, name)) for name in KEPT)
 
 
@@ -142,9 +144,9 @@ def shot_floor(shot: Shot, meshes_at: Callable[[int], Sequence[Mesh]]) -> Floor 
     """Return the height of a shot's ground, None if nothing determines it.
 
     A fixed `scene.floor` is the height. Otherwise the ground is not above any moving thing at any instant, nor above
-    `scene.floor`. So the shot has one height; `meshes_at` gives the mesh of each thing at an instant.
+    `scene.floor`. So the height is the same throughout the shot; `meshes_at` gives the mesh of each thing at an instant.
 
-    If a sequence is cut into shots, its maker gives a `scene.floor` that is fixed, or that no thing is below in any of them.
+    If a sequence is cut into shots, the caller sets a `scene.floor` that is fixed, or that is below all things in all shots.
     """
     floor = shot.scene.floor
     is_fixed = floor is not None and floor.is_fixed
@@ -171,19 +173,19 @@ class _Underside:
 
     @cached_property
     def _corners(self) -> NDArray[np.float64]:
-        """Of its triangles, (3, n)."""
+        """Corners of its triangles, (3, n)."""
         used = np.zeros(len(self.mesh.vertices), np.bool_)
         used[self.mesh.triangles] = True
         return self.mesh.vertices[used].astype(np.float64).T
 
     @cached_property
     def _box(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Centre and half the sides."""
+        """Centre and half the side lengths of its box."""
         low, high = self._corners.min(axis=1), self._corners.max(axis=1)
         return (low + high) / 2, (high - low) / 2
 
     def lowest(self, row: Row, known: float) -> float:
-        """The least height in a pose with this third row, or `known`, whichever is lower."""
+        """The lower of `known` and the lowest height in a pose with this third row."""
         if row == self._row or not self._corners.size:
             return known
         self._row = row

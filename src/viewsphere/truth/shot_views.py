@@ -33,9 +33,9 @@ Float = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class Painted:
-    """The appearance of surfaces: the things at an instant, with their meshes, and the ground, None without one.
+    """The appearance of surfaces: the things at an instant, with their meshes, and the ground (None without one).
 
-    The meshes have the pictures that the shot gives them.
+    The meshes have the textures that the shot assigns to them.
     """
 
     things: Sequence[Thing]
@@ -48,8 +48,8 @@ NO_POINTS: Drawn = np.zeros(0, np.int64), np.zeros((0, 3))
 
 @dataclass(frozen=True, eq=False)
 class Followed:
-    """Points that a sensor follows: query (N, 3) float64, the instant and the position (x, y), pixels, at which each was
-    picked; object (N,) int32, the id of what it lies on, 0 for none.
+    """Points that a sensor follows: query (N, 3) float64, the instant and the position (x, y) in pixels at which each was
+    picked; object (N,) int32, the id of the object under it, 0 for none.
     """
 
     query: Float
@@ -66,9 +66,10 @@ class Followed:
 
 @dataclass(frozen=True, eq=False)
 class ShotViews:
-    """The views of a shot's sensors; instants count from 0 in the shot. `geometry_at` gives all triangles at an instant: those
-    of as many instants as `truth.moving.ROOMS` are there at once; `mesh_of` a still thing's mesh, with all that it looks like,
-    which few labels need.
+    """The views of a shot's sensors; instants count from 0 in the shot.
+
+    `geometry_at` gives all triangles at an instant; the geometries of `truth.moving.ROOMS` instants exist at once. `mesh_of`
+    gives a still thing's mesh with its full appearance, which few labels need.
     """
 
     shot: Shot
@@ -82,7 +83,7 @@ class ShotViews:
     )
 
     def labelled(self, instant: int) -> Geometry:
-        """The triangles that labels know at an instant: a shadow catcher may not be there for them."""
+        """The triangles that labels use at an instant; a shadow catcher may be left out."""
         ground = self.shot.scene.ground
         whole = self.geometry_at(instant)
         if ground is None or ground.is_labelled:
@@ -96,7 +97,7 @@ class ShotViews:
         return known[1]
 
     def view(self, instant: int, sensor: int) -> View:
-        """Return the view of a sensor at an instant; the last views are kept."""
+        """Return the view of a sensor at an instant; the latest views are cached."""
         geometry = self.labelled(instant)
         view = self._views.pop((instant, sensor), None)
         if view is None or view.geometry is not geometry:
@@ -109,13 +110,13 @@ class ShotViews:
         return view
 
     def keep(self, instants: Collection[int]) -> None:
-        """Forget the views of all other instants, whose vertices take much memory."""
+        """Discard the cached views of all other instants, whose vertices take much memory."""
         for known in [known for known in self._views if known[0] not in instants]:
             del self._views[known]
 
     @property
     def _instants(self) -> int:
-        """The number of instants whose views are kept at once; still pictures are not compared with those of other instants."""
+        """The number of instants whose views are cached at once; still pictures are not compared across instants."""
         return ROOMS if self.shot.sequence else 1
 
     @property
@@ -131,13 +132,13 @@ class ShotViews:
         return NeighbourViews(self, instant, sensor)
 
     def followed(self, sensor: int) -> Followed:
-        """The points that a sensor follows through the sequence; picked once for the shot."""
+        """The points that a sensor follows through the sequence, picked once for the shot."""
         if sensor not in self._followed:
             self._followed[sensor] = self._picked(sensor)
         return self._followed[sensor]
 
     def surface(self, instant: int, sensor: int, count: int) -> SurfacePoints:
-        """So many points on each object that is there at an instant; drawn once for each model."""
+        """`count` points on each object that is present at an instant, drawn once for each model."""
         view = self.view(instant, sensor)
         things, drawn = list[int](), list[Drawn]()
         for i, thing in enumerate(view.things[: view.geometry.object_count]):
@@ -181,8 +182,8 @@ class ShotViews:
 
 
 def views_of(shot: Shot, mesh_of: Callable[[Thing], Mesh]) -> ShotViews:
-    """The views of a shot in which no engine has a part; `mesh_of` gives the mesh of a still thing, which is the same object
-    where it has not changed.
+    """The views of a shot in which no engine has a part. `mesh_of` gives the mesh of a still thing; it is the same object while
+    the mesh is unchanged.
     """
     ground = shot.scene.ground is not None and shot.scene.ground.is_labelled
     ring = Ring(ground, shot.label_alpha)
@@ -195,7 +196,7 @@ def views_of(shot: Shot, mesh_of: Callable[[Thing], Mesh]) -> ShotViews:
 
 
 def _drawn(view: View, count: int, on_objects: bool, rng: np.random.Generator) -> Float:
-    """Positions (n, 2) drawn evenly over a picture, or over the pixels that show objects: none where there are none."""
+    """Positions (n, 2) drawn uniformly over a picture, or over the pixels that show objects; empty if there are none."""
     width, height = view.camera.width, view.camera.height
     pixels = np.arange(width * height, dtype=np.intp)
     if on_objects:
@@ -204,15 +205,15 @@ def _drawn(view: View, count: int, on_objects: bool, rng: np.random.Generator) -
         return np.zeros((0, 2))
     chosen = pixels[rng.integers(len(pixels), size=count)]
     corner = np.stack((chosen % width, chosen // width), axis=1).astype(np.float64)
-    return corner + (0.5 if on_objects else rng.random((count, 2)))  # a pixel's centre shows what the pixel says
+    return corner + (0.5 if on_objects else rng.random((count, 2)))  # a pixel's centre shows the object in the pixel's label
 
 
 @dataclass(frozen=True, eq=False)
 class Moment:
     """The poses and cameras at an instant.
 
-    Its fields are the seconds of the sequence; world from each of the objects 1, 2, ... (None: it is not there); the cameras of
-    all sensors in the rig's order; and the number of the picture's own sensor.
+    Its fields are the seconds of the sequence; the pose (world from object) of each of the objects 1, 2, ..., None if it is
+    absent; the cameras of all sensors in the rig's order; and the number of the picture's own sensor.
     """
 
     seconds: float
@@ -242,11 +243,13 @@ class NeighbourViews:
 
     @property
     def partner(self) -> tuple[str, float] | None:
-        """Name of a sensor that is rectified with the sample's own, and the metres between them; None without one."""
+        """The name of a sensor that is rectified with the sample's own, and the distance between them in metres; None without
+        one.
+        """
         return self.views.shot.rig.partner(self.sensor_number)
 
     def moment(self, instants: int) -> Moment | None:
-        """Return the poses and cameras so many instants later, None if the shot does not have that instant."""
+        """Return the poses and cameras `instants` instants later, None if the shot does not have that instant."""
         shot, instant = self.views.shot, self.views.shot.instant_after(self.instant, instants)
         if instant is None:
             return None
@@ -255,7 +258,9 @@ class NeighbourViews:
         return Moment(shot.instants[instant].seconds, poses, cameras, self.sensor_number)
 
     def view(self, instants: int, sensor: str | None) -> View | None:
-        """That of a sensor, None for the sample's own, so many instants later; None without such a sensor or instant."""
+        """The view of a sensor (None for the sample's own) `instants` instants later; None if that sensor or instant does not
+        exist.
+        """
         instant = self.views.shot.instant_after(self.instant, instants)
         names = [one.name for one in self.views.shot.rig.sensors]
         if instant is None or (sensor is not None and sensor not in names):
@@ -278,9 +283,9 @@ class NeighbourViews:
         return self.views.shot.rig.sensors[self.sensor_number]
 
     def turning(self, seconds: float) -> Turning:
-        """Return the motion of things and sensor while its columns are measured, within so many seconds around the instant.
+        """Return the motion of things and sensor while its columns are measured, within `seconds` seconds around the instant.
 
-        The motion is straight between instants, as while a shutter is open. Before the first instant and after the last, it
+        The motion is straight between instants, as during an exposure. Before the first instant and after the last, it
         continues unchanged.
         """
         shot, width = self.views.shot, self.sensor.intrinsics.width
@@ -298,7 +303,8 @@ class NeighbourViews:
         return Turning(rotation, -product(rotation, placed[:, :3, 3:])[..., 0], moved)
 
     def _poses(self, poses: Sequence[Matrix4 | None], moments: Float) -> Float:
-        """Poses (n, 4, 4) at moments (n,), seconds from the instant, of what has these at the shot's instants."""
+        """Poses (n, 4, 4), at moments (n,) in seconds from the instant, interpolated from these poses at the shot's instants.
+        """
         shot, now = self.views.shot, poses[self.instant]
         assert now is not None
         known = {offset: shot.instant_after(self.instant, offset) for offset in (-1, 1)}
@@ -327,9 +333,10 @@ class NeighbourViews:
 
     @property
     def drawn_as(self) -> tuple[str, ...]:
-        """The names that, beside a seed, key the randomness in the sample's labels: its subject without variation, its sensor,
-        and its instant, which is named by its time and by where the rig is then. Nothing of it depends on how a data set is
-        stored, so the same frame has the same draws however it came there.
+        """The names that, with a seed, key the randomness of the sample's labels: its subject without variation, its sensor,
+        and its instant, named by its time and by the rig's place at that time.
+
+        None of them depends on how a data set is stored, so the same frame always has the same random draws.
         """
         shot, now = self.views.shot, self.views.shot.instants[self.instant]
         return shot.subject, self.sensor.name, repr(now.seconds), repr(now.world_from_rig)
@@ -340,5 +347,5 @@ class NeighbourViews:
         return self.views.followed(self.sensor_number)
 
     def surface(self, count: int) -> SurfacePoints:
-        """Return so many points on each object."""
+        """Return `count` points on each object."""
         return self.views.surface(self.instant, self.sensor_number, count)

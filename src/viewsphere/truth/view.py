@@ -1,4 +1,4 @@
-"""A view: what one camera may see at one instant, and which things of two views are the same."""
+"""A view: one camera at one instant. Also the tests whether things of two views are the same."""
 
 from __future__ import annotations
 
@@ -23,8 +23,10 @@ Change = Literal["moved", "deformed", "gone"]
 
 @dataclass(frozen=True, eq=False)
 class Body:
-    """One thing of a view, at this position in its `things`, as far as points depend on it that stick to it: they are on its
-    triangles (n, 3), whose vertices are counted from `base` on, and lie at `places` (v, 3) in the thing's own axes.
+    """One thing of a view, at this position in its `things`, reduced to the data that attached points depend on.
+
+    They are its triangles (n, 3), whose vertices are counted from `base` on, and the `places` (v, 3) of these in the thing's
+    own axes.
     """
 
     position: int
@@ -39,10 +41,10 @@ class Body:
         return (self.triangles - np.int32(self.base)).reshape(-1)
 
     def has_triangles_of(self, other: Body) -> bool:
-        """Return whether both are the same thing, there, and made of the same triangles, wherever its vertices are.
+        """Return whether both are the same thing, present, and made of the same triangles, wherever its vertices are.
 
-        Normals divide vertices: corners that share one while two triangles are level need two once they are not. So corners are
-        compared by their places: those that are one vertex in either have to be in one place in the other.
+        Normals split vertices: two corners may share a vertex while their triangles are level, and need two once they are not.
+        So corners are compared by their places: corners that share a vertex in one body must be at the same place in the other.
         """
         one, two = self.thing, other.thing
         if one is not two and not (one.is_there and two.is_there and (one.model is two.model or one.model == two.model)):
@@ -54,7 +56,7 @@ class Body:
         return np.array_equal(self.corners, other.corners) or (self._is_joined_in(other) and other._is_joined_in(self))
 
     def _is_joined_in(self, other: Body) -> bool:
-        """Return whether the corners of each vertex are in one place in another body of as many triangles."""
+        """Return whether the corners of each vertex are at the same place in another body with as many triangles."""
         corners = self.corners
         first = np.zeros(len(self.places), np.intp)
         first[corners[::-1]] = np.arange(len(corners))[::-1]
@@ -64,11 +66,11 @@ class Body:
 
 @dataclass(frozen=True, eq=False)
 class View:
-    """One camera at one instant. `geometry` has the triangles of `things` as they are then, each standing still: see
-    `Shot.things_at` and `Stage.at`. Use a view as long as its geometry is not written to again: see `truth.moving.Ring`.
+    """One camera at one instant. `geometry` has the triangles of `things` at that instant, all standing still: see
+    `Shot.things_at` and `Stage.at`. Use a view only until its geometry is overwritten: see `truth.moving.Ring`.
 
-    is_sky_endless: whether a pixel without a triangle shows a direction (sky, surrounding), or a flat picture, which is
-    nowhere. is_compared: whether labels may compare this view with others.
+    is_sky_endless: whether a pixel without a triangle shows a direction (sky, surrounding), or a flat picture, which has no
+    place. is_compared: whether labels may compare this view with others.
     """
 
     things: Sequence[Thing]
@@ -84,22 +86,22 @@ class View:
 
     @cached_property
     def boxes(self) -> NDArray[np.int32]:
-        """The pixel that each vertex is in, (n, 4), as `truth.raster.visibility.pixels_of` says; of a pinhole."""
+        """The pixel range of each vertex, (n, 4), as in `truth.raster.visibility.pixels_of`; for a pinhole only."""
         return pixels_of(self.geometry, self.corners, (self.camera.width, self.camera.height))
 
     @cached_property
     def shown(self) -> Geometry:
-        """The geometry without the triangles that turn a back to the camera which it does not see."""
+        """The geometry without the single-sided triangles that face away from the camera."""
         return seen_from(self.geometry, self.corners)
 
     def is_turned_away(self, triangles: NDArray[np.int32]) -> NDArray[np.bool_]:
-        """Return whether the camera cannot see these triangles, -1 for none, because they turn their backs to it."""
+        """Return whether the camera cannot see these triangles (-1 for none) because they face away from it."""
         is_gone = self.shown.triangle_cutout != self.geometry.triangle_cutout
         return (triangles >= 0) & is_gone[triangles]
 
     @cached_property
     def visibility(self) -> Visibility:
-        """The triangles and the depth that the camera sees."""
+        """The triangles and the depth visible to the camera."""
         return rasterize(self.geometry, self.camera, corners=self.corners, keeps_exact=self.is_compared)
 
     @cached_property
@@ -118,7 +120,7 @@ class View:
 
     @cached_property
     def world_from_camera(self) -> Float:
-        """The inverse of the camera's R, (3, 3): of a rotation that is one to a few digits only, too."""
+        """The inverse of the camera's R, (3, 3), even if R is a rotation only to a few digits."""
         return inverse(self.camera.R)
 
     @cached_property
@@ -133,12 +135,12 @@ class View:
 
     @property
     def has_unit_rays(self) -> bool:
-        """Return whether s is measured along rays of length 1, see `truth.raster.visibility.Visibility`."""
+        """Return whether s is measured along rays of length 1; see `truth.raster.visibility.Visibility`."""
         return self.camera.lens.has_unit_rays
 
     @property
     def owners(self) -> NDArray[np.int32]:
-        """The thing of each triangle, by its position in `things`; the ground's is the number of things."""
+        """The thing of each triangle, by its position in `things`; for the ground, the number of things."""
         return _owners(self.geometry.triangle_start, len(self.geometry.triangles))
 
     def body(self, i: int) -> Body:
@@ -175,7 +177,7 @@ class View:
         return self.geometry.coordinates[first:stop]
 
     def has_camera_of(self, other: View) -> bool:
-        """Return whether both cameras are the same, and stand in one place."""
+        """Return whether both cameras are the same, and at the same place."""
         return self.turns_like(other) and np.array_equal(self.camera.t, other.camera.t)
 
     def turns_like(self, other: View) -> bool:
@@ -184,7 +186,7 @@ class View:
         return same_lens and np.array_equal(self.camera.R, other.camera.R)
 
     def has_ground_of(self, other: View) -> bool:
-        """Return whether both views have a ground, and it is one."""
+        """Return whether both views have a ground at the same height."""
         return self.geometry.ground_z is not None and self.geometry.ground_z == other.geometry.ground_z
 
     def has_sky_of(self, other: View) -> bool:

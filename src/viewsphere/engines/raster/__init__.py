@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 def check(options: Mapping[str, JsonValue]) -> None:
-    """Raise UserError for an option that is not known (with the nearest name) or out of range."""
+    """Raise UserError for an unknown option (with the nearest name) or a value out of range."""
     from viewsphere.engines.raster.options import parse_options
 
     parse_options(options)

@@ -1,4 +1,4 @@
-"""The data from which the engine paints pictures of an instant, and the part of the data that outlives the instant."""
+"""The data from which the engine paints pictures of an instant, and the part of that data that is reused for other instants."""
 
 from __future__ import annotations
 
@@ -36,7 +36,8 @@ from viewsphere.truth.raster.geometry import Geometry, with_blended_colors
 
 @dataclass(frozen=True, eq=False)
 class Packed:
-    """The materials and surfaces of arranged things. kind, owner, see_through, blended: see `Baked`; maps: of a sequence."""
+    """The materials and surfaces of arranged things. kind, owner, see_through, blended: see `Baked`; maps: those of a sequence.
+    """
 
     arranged: Arranged
     lengths: Lengths
@@ -50,11 +51,11 @@ class Packed:
 
     @property
     def surfaces(self) -> Surfaces:
-        """Of all things; see `surface.Rows`."""
+        """The surfaces of all things; see `surface.Rows`."""
         return self.rows.surfaces
 
     def at(self, arranged: Arranged, ground: Ground | None, lengths: Lengths) -> Packed:
-        """The same where things are elsewhere. Nothing of this one may be used then: what moved is written in place."""
+        """The data after things have moved. Do not use this object afterwards: data of moved things is overwritten in place."""
         geometry, same_lengths = arranged.geometry, lengths == self.lengths
         materials = self.materials if same_lengths and self.materials.made_of == made_of(arranged.whole) else None
         is_alike = geometry.triangles is self.arranged.geometry.triangles and arranged.moving == self.arranged.moving
@@ -95,8 +96,8 @@ def pack(arranged: Arranged, ground: Ground | None, lengths: Lengths, materials:
 
 
 def still_lengths(arranged: Arranged) -> Lengths:
-    """Of a still picture: half the diagonal of all there is, from its middle; where there is scenery the next power of two,
-    from the world's origin, so that they stay the same when the targets change.
+    """The lengths for a still picture: half the diagonal of everything, from its middle. With scenery, the unit is the next
+    power of two, and the origin is the world's, so that both stay the same when the targets change.
     """
     low, high = arranged.geometry.extent()
     unit = float(np.linalg.norm(high - low)) / 2 or 1.0
@@ -107,8 +108,8 @@ def still_lengths(arranged: Arranged) -> Lengths:
 
 
 def sequence_lengths(meshes: Sequence[Mesh]) -> Lengths:
-    """Of all pictures of a sequence, wherever its things are, and however it is cut into shots: about half the size of the
-    largest thing, from the world's origin.
+    """The lengths for all pictures of a sequence, wherever its things are and however it is cut into shots: about half the size
+    of the largest thing, from the world's origin.
     """
     sizes = [np.linalg.norm(np.subtract(*mesh.bounds)) for mesh in {id(m): m for m in meshes}.values() if len(mesh.triangles)]
     unit = float(max(sizes, default=0.0)) / 2 or 1.0
@@ -118,7 +119,7 @@ def sequence_lengths(meshes: Sequence[Mesh]) -> Lengths:
 def bake(packed: Packed, scene: Scene, options: Options, shades: TargetShades, bounce_scenes: BounceScenes) -> Baked:
     """Return the data from which the engine paints pictures of arranged things.
 
-    `shades` keeps the occlusion by targets of a sequence, `bounce_scenes` the surfaces that throw light.
+    `shades` caches the occlusion by targets of a sequence, `bounce_scenes` the surfaces that reflect light.
     """
     geometry, surfaces, lengths = packed.arranged.geometry, packed.surfaces, packed.lengths
     has_ground = scene.ground is not None
@@ -166,7 +167,7 @@ def _casters(packed: Packed, has_ground: bool) -> Casters:
     arranged, (corner, unit) = packed.arranged, packed.lengths
     geometry, origin, targets = arranged.geometry, np.array(corner), arranged.targets
     low, high = geometry.extent()
-    # A light from afar looks along any direction: its widest map holds a ball around all corners.
+    # A distant light may have any direction: its widest map covers a ball around all corners.
     reach = float(np.linalg.norm(np.abs(np.stack([low, high]) - origin).max(axis=0))) / unit
     ground_z = geometry.ground_z
     if arranged.has_scenery:
@@ -186,14 +187,14 @@ def _casters(packed: Packed, has_ground: bool) -> Casters:
 
 
 def _corners(bounds: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Of the boxes (N, 2, 3) of things that are there: (8 n, 3)."""
+    """The corners (8 n, 3) of the boxes (N, 2, 3) of present things."""
     there = bounds[np.isfinite(bounds).all(axis=(1, 2))]
     which = np.indices((2, 2, 2)).reshape(3, 8).T
     return there[:, which, np.arange(3)].reshape(-1, 3)
 
 
 def _is_see_through(looks: Float32) -> NDArray[np.bool_]:
-    """Of each material: whether anything behind it shows."""
+    """A mask of the materials through which anything behind is visible."""
     metal = looks[:, L_METAL] + looks[:, L_METAL_TEXEL]
     return (looks[:, L_BLENDED] > 0) | (looks[:, L_TRANSMISSION] * (1 - metal) > 0)
 
@@ -201,8 +202,9 @@ def _is_see_through(looks: Float32) -> NDArray[np.bool_]:
 def _floor(
     ground: Ground | None, lengths: Lengths, around: Lengths, material: int
 ) -> tuple[Float32, NDArray[np.float64] | None, Hashable]:
-    """`Baked.floor`, the ground's mean colour, and a value equal for grounds made of the same; zeros and None where there is
-    none. around: the extent of all there is.
+    """`Baked.floor`, the ground's mean colour, and a value that is equal for equal grounds; zeros and None without a ground.
+
+    `around` is the extent of everything.
     """
     if ground is None:
         return np.zeros(13, np.float32), None, None

@@ -1,7 +1,7 @@
-"""Motion blur: pictures at several moments while the shutter is open, each smeared along its own flow, and their mean.
+"""Motion blur: pictures at several moments of the exposure, each smeared along its own flow, then averaged.
 
-A smeared picture stands for about four that are not. Things, cameras, light and shadows are where they are at each moment, so
-what one thing hides from another is right, too.
+A smeared picture replaces about four that are not. Things, cameras, light and shadows are placed for each moment, so occlusion
+between things is correct, too.
 """
 
 from __future__ import annotations
@@ -30,13 +30,13 @@ STRIDE = 16.0
 """Pixels of motion between two pictures that are averaged."""
 
 MOST = 16
-"""Pictures that are averaged at most."""
+"""Maximum number of pictures that are averaged."""
 
 LEAST = 1.0
-"""Pixels of motion while the shutter is open from which on anything is blurred."""
+"""Pixels of motion during the exposure above which a picture is blurred."""
 
 Paint = Callable[[Arranged, Camera, Visibility, Float32], None]
-"""Fills the light (H * W, 4) of what is arranged, seen by a camera."""
+"""A function that fills the light (H * W, 4) of arranged things, seen by a camera."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,7 +64,7 @@ class Blur:
         return 1 if longest < LEAST else min(1 + math.ceil(longest / STRIDE), MOST)
 
     def paint(self, count: int, paint: Paint, radiance: Float32) -> None:
-        """Fill `radiance` (H * W, 4) with the mean of so many smeared pictures."""
+        """Fill `radiance` (H * W, 4) with the mean of `count` smeared pictures."""
         camera = self._shot.camera(self.instant, self.sensor)
         shape = camera.height, camera.width, 4
         total, calmed = np.zeros(shape, np.float32), np.empty(shape, np.float32)
@@ -86,7 +86,7 @@ class Blur:
         return exposure is None or (exposure.rig is None and not any(exposure.things))
 
     def _deforms(self, geometry: Geometry, visibility: Visibility) -> float:
-        """Pixels by which vertices of what deforms move at most in its own axes, if they are as near as what is seen of it."""
+        """Maximum motion, in pixels, of a deforming thing's vertices in its own axes, at the distance of its visible part."""
         camera, exposure = self._camera(0.0), self._shot.exposures[self.instant]
         sweeps = enumerate(exposure.things if exposure else ())
         deforming = [i for i, sweep in sweeps if sweep and len(set(sweep.motion.steps)) > 1]
@@ -104,7 +104,7 @@ class Blur:
         return longest
 
     def _camera(self, moment: float) -> Camera:
-        """moment: -0.5 where the shutter opens, 0.5 where it closes."""
+        """The camera at a moment: -0.5 when the shutter opens, 0.5 when it closes."""
         return self._shot.camera_during(self.instant, moment * self._shot.shutter, self.sensor)
 
     def _poses(self, moment: float) -> list[Matrix4]:
@@ -136,7 +136,7 @@ def _lengths(way: Float32) -> Float32:
 
 
 def _moves(camera: Camera, poses: Sequence[Matrix4], then: Camera, others: Sequence[Matrix4]) -> Float:
-    """For each thing, and for what stands still, camera axes then from camera axes now, (N + 1, 3, 4)."""
+    """The transforms (N + 1, 3, 4) from camera axes now to camera axes then, for each thing and for still things."""
     here, there = _inverse(_extrinsics(camera)), _extrinsics(then)
     still = compose(there, here)
     moves = [
@@ -153,7 +153,7 @@ def _extrinsics(camera: Camera) -> Float:
 
 
 def _inverse(pose: Float) -> Float:
-    """Of a rigid pose (4, 4)."""
+    """The inverse of a rigid pose (4, 4)."""
     turned = np.eye(4)
     turned[:3, :3] = pose[:3, :3].T
     moved = np.eye(4)

@@ -1,4 +1,6 @@
-"""Baked light in the cache: made once for equal places, skies and models, and shared in memory by the processes that use it."""
+"""Baked light in the cache: computed once for equal places, skies and models, and shared in memory by all processes that use
+it.
+"""
 
 from __future__ import annotations
 
@@ -20,16 +22,16 @@ from viewsphere.kernels.digests import package_digest
 T = TypeVar("T")
 
 PACKAGES = ("engines", "rendering", "materials", "geometry", "kernels")
-"""Packages whose sources baked light depends on, besides the meshes and the light that it is made of."""
+"""Packages whose sources affect baked light, in addition to its meshes and lights."""
 
 
 def kept_light(content: Iterable[Any], make: Callable[[], T], types: tuple[type, ...]) -> T:
-    """The result of `make`, from the cache where it holds what was made of equal content. `types`: of the result's records."""
+    """The result of `make`, from the cache if it has the result for equal content. `types`: those of the result's records."""
     return kept("light", digest_of(content), make, pack_records, lambda held: unpack_records(held, types))
 
 
 def digest_of(content: Iterable[Any]) -> str:
-    """The digest of arrays, bytes and values that `repr` tells apart, and of the sources."""
+    """The digest of the sources, and of arrays, bytes and values that `repr` distinguishes."""
     digest = hashlib.sha256(_sources().encode())
     for part in content:
         if isinstance(part, np.ndarray):
@@ -42,7 +44,7 @@ def digest_of(content: Iterable[Any]) -> str:
 
 @cache
 def _sources() -> str:
-    """Digest of the sources, of the kernels' build, and of what numpy's sines depend on: the processor's type."""
+    """The digest of the sources, of the kernels' build, and of the processor's type, which affects numpy's sines."""
     package = Path(__file__).parents[2]
     return " ".join([HOST, np.__version__, *(package_digest(package / name) for name in PACKAGES)])
 
@@ -54,7 +56,7 @@ def pack_records(value: Any) -> Content:
 
 
 def unpack_records(content: Content, types: Iterable[type]) -> Any:
-    """The value that `pack_records` made plain, of records of these types; others raise KeyError."""
+    """The value that `pack_records` converted to plain data, with records of these types; others raise KeyError."""
     return _unpacked(content.about, content.arrays, {kind.__name__: kind for kind in types})
 
 

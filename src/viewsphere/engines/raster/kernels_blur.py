@@ -1,4 +1,4 @@
-"""The motion of visible points while the shutter is open, and pictures smeared along it."""
+"""The motion of visible points during the exposure, and pictures smeared along it."""
 
 from __future__ import annotations
 
@@ -11,19 +11,19 @@ from viewsphere.kernels.jit import inner, njit
 
 f4 = nb.float32
 U = nb.uintp
-TILE = 16  # pixels: no way is much longer
-SHORTEST = 0.25  # square pixels: of a way that counts
-STEP, LEAST, MOST = 2.0, 4, 16  # pixels between places where a picture is read along a way, and how many these are
-GLINT = 3.0  # times the second brightest pixel around: as bright as a single pixel may be
-ALIKE = 0.25  # squared share of its way by which the way of what moves along with a pixel may differ
+TILE = 16  # pixels: limit of a way's length
+SHORTEST = 0.25  # square pixels: squared length above which a way counts
+STEP, LEAST, MOST = 2.0, 4, 16  # pixels between samples along a way, and the number of samples
+GLINT = 3.0  # maximum brightness of a single pixel, relative to the second brightest pixel around
+ALIKE = 0.25  # squared share by which a way may differ from that of a pixel with the same motion
 
 
 @njit
 def carry(rays, inverse_depth, triangle, owner, moves, points):
-    """Fill points (H, W, 3) float64: camera axes, up to a positive factor, of what each pixel shows at another moment.
+    """Fill points (H, W, 3) float64: the camera axes, up to a positive factor, of each pixel's point at another moment.
 
-    rays (H, W, 3) and inverse_depth (H, W): as in `raster.visibility`; owner (T,) int32: which of moves (M, 3, 4), camera axes
-    then from camera axes now, is that of each triangle; the last one is that of the sky.
+    rays (H, W, 3) and inverse_depth (H, W): as in `raster.visibility`; owner (T,) int32: for each triangle, its row in moves
+    (M, 3, 4), which map camera axes now to camera axes then; the last row is for the sky.
     """
     for i in range(U(triangle.shape[0])):
         for j in range(U(triangle.shape[1])):
@@ -36,14 +36,15 @@ def carry(rays, inverse_depth, triangle, owner, moves, points):
 
 @inner
 def _is_alike(way, row, column, u, v):
-    """Return whether a pixel moves about like this."""
+    """Return whether a pixel's motion is about (u, v)."""
     p, q = way[row, column, 0] - u, way[row, column, 1] - v
     return p * p + q * q <= f4(ALIKE) * (u * u + v * v)
 
 
 @njit(_nrt=True)
 def find_longest(way, tiles):
-    """Fill tiles (m, n, 2): the longest way (H, W, 2) among the pixels of each square of TILE x TILE and of its neighbours."""
+    """Fill tiles (m, n, 2) with the longest way (H, W, 2) among the pixels of each square of TILE x TILE and of its neighbours.
+    """
     own = np.zeros_like(tiles)
     for y in range(way.shape[0]):
         for x in range(way.shape[1]):
@@ -63,7 +64,9 @@ def find_longest(way, tiles):
 
 @inner
 def _brightest(picture, y, x):
-    """Of the light around a pixel: the second brightest of its neighbours' brightest channels, which of a line is as bright."""
+    """The second brightest value among the neighbours of a pixel, by their brightest channels; on a line, it is as bright as
+    the line.
+    """
     first, second = f4(0), f4(0)
     for k in range(9):
         row, column = y + k // 3 - 1, x + k % 3 - 1
@@ -77,8 +80,8 @@ def _brightest(picture, y, x):
 
 @njit
 def calm(picture, out):
-    """Copy a picture (H, W, 4), with single pixels that are far brighter than all around dimmed: the mean of a few pictures
-    would show each of these as a dot.
+    """Copy a picture (H, W, 4), with isolated bright pixels dimmed: the mean of a few pictures would show each of them as a
+    dot.
     """
     for y in range(picture.shape[0]):
         for x in range(picture.shape[1]):
@@ -93,13 +96,13 @@ def calm(picture, out):
 
 @inner
 def _along(s, y, x, u, v, height, width):
-    """The place a share of a way after a pixel, not outside of the picture."""
+    """The place reached after a share of a way from a pixel, clamped to the picture."""
     return min(max(f4(y) + s * v, f4(0)), f4(height - 1)), min(max(f4(x) + s * u, f4(0)), f4(width - 1))
 
 
 @inner
 def _add(picture, row, column, share, total, y, x):
-    """Add a share of the picture's light at a place between its pixels to a pixel of `total`."""
+    """Add a share of the picture's light, interpolated between pixels, to a pixel of `total`."""
     height, width = picture.shape[0], picture.shape[1]
     i, j = max(min(int(column), width - 2), 0), max(min(int(row), height - 2), 0)
     p, q = column - f4(i), row - f4(j)
@@ -112,9 +115,11 @@ def _add(picture, row, column, share, total, y, x):
 
 @njit
 def smear(picture, calmed, way, tiles, inverse_depth, total):
-    """Add a picture (H, W, 4) to `total`, each pixel averaged over its way (H, W, 2), in whose middle it is, and over what
-    passes before it, whose way is the longest near by (`find_longest`): of the picture as `calm` leaves it, but pixels that
-    nothing moves past stay as they are. What moves behind something does not take on its light.
+    """Add a picture (H, W, 4) to `total`, with each pixel averaged along its way (H, W, 2), which it is in the middle of, and
+    over surfaces that pass in front.
+
+    The way of passing surfaces is the longest nearby (`find_longest`). The picture is the one that `calm` returns, but pixels
+    that nothing passes are unchanged. Surfaces that move behind another one do not receive its light.
     """
     height, width = picture.shape[0], picture.shape[1]
     for y in range(height):

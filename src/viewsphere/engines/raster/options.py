@@ -13,14 +13,16 @@ from viewsphere.errors import RecipeError
 from viewsphere.validation.errors import one_of
 
 ANTIALIAS = (1, 4, 16, 64)
-"""Allowed numbers of samples in an edge pixel; beyond four, every pixel has a quarter as many."""
+"""Allowed numbers of samples in an edge pixel; above four, every pixel has a quarter of this number."""
 
 
 @dataclass(frozen=True)
 class Options:
     """antialias: samples in an edge pixel, see `ANTIALIAS`; shadow_resolution: width of the shadow maps in texels, 0 to derive
-    it from the pictures' size; ambient_occlusion: off, fast or fine; bounces: whether still things throw light at one another:
-    on, off, auto, on where a place shuts out the sky, or fine, gathered by rays from each pixel, too.
+    it from the pictures' size; ambient_occlusion: off, fast or fine.
+
+    bounces: whether still things reflect light onto one another: on, off, auto (on in places that shut out the sky), or fine
+    (also gathered by rays from each pixel).
     """
 
     antialias: int = 4
@@ -34,7 +36,8 @@ class Options:
         return max(math.isqrt(self.antialias // 4), 1)
 
     def for_width(self, pixels: int) -> int:
-        """Width of the shadow maps for pictures whose longer side has so many pixels: the next power of two, 1,024 to 4,096."""
+        """Width of the shadow maps for pictures whose longer side has this many pixels: the next power of two, 1,024 to 4,096.
+        """
         return self.shadow_resolution or min(max(1 << (pixels - 1).bit_length(), 1024), 4096)
 
 

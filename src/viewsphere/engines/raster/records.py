@@ -1,6 +1,8 @@
-"""The arrays that the shading kernels read, packed once per stage (PictureRays: once per picture). All float32 unless said.
+"""The arrays that the shading kernels read, packed once per stage (PictureRays: once per picture). All are float32 unless
+stated.
 
-Lengths are in units of half the diagonal of the objects' bounds, from their centre: models of any size keep their digits.
+Lengths are in units of half the diagonal of the objects' bounds, from their centre, so that models of any size keep their
+precision.
 """
 
 from __future__ import annotations
@@ -33,8 +35,8 @@ class Surfaces(NamedTuple):
 class Textures(NamedTuple):
     """The mip levels of all textures in one array, as bundles: textures that a material looks up together.
 
-    texels (N,) uint16: for linear light and data 65,535 means 1; for components of normals 32,768 means 0 and 65,535 means 1;
-    behind the last texel there is room for reading three planes at once. levels (X, 16, 3) int32: first word, width and height
+    texels (N,) uint16: for linear light and data, 65,535 means 1; for components of normals, 32,768 means 0 and 65,535 means 1.
+    After the last texel there is room for reading three planes at once. levels (X, 16, 3) int32: first word, width and height
     of each level. modes (X, 14) int32: number of levels, wrap along u and v, nearest, uv set, number of planes of four
     channels, kinds of up to six planes, whether the bundle has normals and the coat's normals. transforms (X, 6): rows of the 2
     x 3 matrix on (u, v, 1).
@@ -49,9 +51,9 @@ class Textures(NamedTuple):
 class PictureRays(NamedTuple):
     """One picture's rays: direction = rotation.T @ ray.
 
-    eye (3,); rotation (3, 3) world to camera; lens (2, 3): ray = lens @ (column, row, 1) in samples;
-    rays (S, 3), empty for a pinhole; columns: samples in a row; pixel: a pixel's size at distance 1; scale: factor of depths;
-    places (S, 2): column and row of samples that do not lie on a grid, else empty.
+    eye (3,); rotation (3, 3) world to camera; lens (2, 3): ray = lens @ (column, row, 1) in samples; rays (S, 3), empty for a
+    pinhole; columns: samples in a row; pixel: a pixel's size at distance 1; scale: factor of depths; places (S, 2): column and
+    row of samples that are not on a grid, otherwise empty.
     """
 
     eye: Float32
@@ -65,12 +67,12 @@ class PictureRays(NamedTuple):
 
 
 class Lightmap(NamedTuple):
-    """Light that arrives at still surfaces: at flat ones, which have charts, and at facets of others.
+    """Light that arrives at still surfaces: at flat ones, which have charts, and at facets of the others.
 
-    nodes (N, 12): see `kernels_lightmap.see`; charts (C, 16): columns named in `kernels_lightmap`; chart (T,) int32: of
-    each of the stage's triangles, -1 for none, -2 - k for facet k; empty if there are no charts; facets (F, 5): columns named
-    in `kernels_vertex_light`; knots (I,) int32: the points of each facet, row by row; points (P, 12): how much each counts;
-    times that: light along x, y and z.
+    nodes (N, 12): see `kernels_lightmap.see`; charts (C, 16): columns named in `kernels_lightmap`; chart (T,) int32: the chart
+    of each of the stage's triangles, -1 for none, -2 - k for facet k; empty if there are no charts; facets (F, 5): columns
+    named in `kernels_vertex_light`; knots (I,) int32: the points of each facet, row by row; points (P, 12): the weight of each,
+    then, multiplied by it, light along x, y and z.
     """
 
     nodes: Float32
@@ -86,7 +88,7 @@ class PatchLight(NamedTuple):
 
     keys (S,) uint64, patch (S,) int32: their table, see `kernels_probes.patch`. light (M, 3): the radiance of each patch, -1
     for emissive triangles, whose light arrives through the probes. frame (7,): the box of the probes, and the number of patches
-    in a length. materials (T,): of the triangles that rays meet, numbered as when the table was made.
+    in a length. materials (T,): those of the triangles that rays can hit, with the numbers used when the table was made.
     """
 
     keys: NDArray[np.uint64]
@@ -97,19 +99,20 @@ class PatchLight(NamedTuple):
 
 
 class Bounces(NamedTuple):
-    """Light that things throw at one another: a volume of probes, and a map of level ground below things that stand on it.
+    """Light that things reflect onto one another: a volume of probes, and a map of level ground below things that are on it.
 
-    light (cells, 28) float32: irradiance at each probe, columns named in `kernels_bounce`; views (cells * NODES, 4): what each
-    probe sees in each direction, see `kernels_views`: radiance of things, and the share that they leave of what is far away;
-    screens (cells, 72): of the cell whose first corner a probe is, for each of its eight corners, what part of the cell that
-    corner sees: the normal's x of all eight, y, z and offset of a plane, in cells from the first corner, those of a second one,
-    and how much it counts where it sees nothing; grid (3,) int64: layers, rows and columns, 0 for no volume; frame (2, 7), of
-    the volume and of that around it, of as many probes, or of the volume again: x, y and z of the first probe, cells per
-    length, how far from a surface it is read in cells, one over the number of cells in which its light ends at the border, the
-    first probe's row; floor (n, n, 4): radiance of a white matt ground lit by
-    things alone; floor_frame (4,): its cells per length, its corner's x and y, whether there is a map; lightmap: where it is
-    known better than by probes; sent: what patches of things send; near (S, 4), or empty: of each sample, how much of the
-    probes' light arrives, and the light of what is nearer than they know (`near_field_gather`).
+    light (cells, 28) float32: irradiance at each probe, columns named in `kernels_bounce`. views (cells * NODES, 4): the view
+    of each probe in each direction, see `kernels_views`: radiance of things, and the share of the far background that they
+    leave visible. screens (cells, 72): for the cell whose first corner is the probe, the part of the cell that each of its
+    eight corners sees. The columns are the normal's x for all eight corners, then y, z and the offset of a plane, in cells from
+    the first corner, then those of a second plane, then the weight of a corner that sees nothing. grid (3,) int64: layers, rows
+    and columns, 0 for no volume. frame (2, 7): for the volume and for the volume around it, with as many probes, or the same
+    volume again: x, y and z of the first probe, cells per length, distance from a surface at which it is read in cells, one
+    over the number of cells in which its light ends at the border, and the first probe's row. floor (n, n, 4): radiance of a
+    white matt ground lit only by things. floor_frame (4,): its cells per length, its corner's x and y, and whether there is a
+    map. lightmap: surfaces for which it is more accurate than probes. sent: the light that patches of things send. near (S, 4),
+    or empty: for each sample, the share of the probes' light that arrives, and the light of nearer surfaces
+    (`near_field_gather`).
     """
 
     light: Float32

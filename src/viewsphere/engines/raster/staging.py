@@ -1,4 +1,4 @@
-"""The raster engine's stage: everything baked, ready to be seen from any camera."""
+"""The raster engine's stage: all data is baked and ready for any camera."""
 
 from __future__ import annotations
 
@@ -38,12 +38,12 @@ from viewsphere.truth.raster.geometry import Geometry
 from viewsphere.truth.raster.visibility import Visibility, rasterize
 
 Paint = Callable[[Camera, Visibility, Float32, Float32], None]
-"""Fills the light (H * W, 4) that a camera sees, and its parts (H * W, C), which are 0 before, or (0, 0)."""
+"""A function that fills the light (H * W, 4) seen by a camera, and its parts (H * W, C), which are 0 before, or (0, 0)."""
 
 
 @dataclass(frozen=True, eq=False)
 class RasterStage:
-    """A shot's scene baked for shading, as it was at the last instant that was asked for."""
+    """A shot's scene baked for shading, for the most recently requested instant."""
 
     arrangements: Arrangements
     options: Options
@@ -59,7 +59,7 @@ class RasterStage:
         return self.arrangements.shot
 
     def of(self, shot: Shot) -> RasterStage:
-        """The same for another shot, one of an equal `stage_key`."""
+        """The stage for another shot with an equal `stage_key`."""
         return replace(self, arrangements=self.arrangements.of(shot))
 
     def at(self, instant: int) -> Geometry:
@@ -67,7 +67,7 @@ class RasterStage:
         return self.arrangements.at(instant).geometry
 
     def baked(self, instant: int) -> Baked:
-        """Return the data from which pictures of an instant are painted; the stage keeps the last one."""
+        """Return the data from which pictures of an instant are painted; the stage caches the latest one."""
         arranged = self.arrangements.at(instant)
         key = arranged.geometry, arranged.is_sequence
         if key not in self._baked:
@@ -99,7 +99,7 @@ class RasterStage:
                 and Blur(self.arrangements, instant, sensor).count(self.at(instant), visibility) == 1
             ):
                 camera = self.shot.camera(instant, sensor)
-                painted[picture] = self._finished(instant, camera, visibility, picture)  # of the light that was parted
+                painted[picture] = self._finished(instant, camera, visibility, picture)  # from the light that was split
         if not set(names).isdisjoint(MATERIAL_PASSES):
             made = materials(self.baked(instant), self.shot.camera(instant, sensor), visibility)
             painted |= dict(zip(MATERIAL_PASSES, made.T.reshape(2, *visibility.triangle.shape).copy(), strict=True))
@@ -108,7 +108,7 @@ class RasterStage:
         return {name: painted[name] for name in names}
 
     def _light(self, instant: int, sensor: int, visibility: Visibility, names: Collection[str]) -> dict[str, Float32]:
-        """Return all `LIGHT_PASSES`, with the sky where the picture has it; (H, W, 3) each."""
+        """Return all `LIGHT_PASSES`, with the sky if the picture has it; (H, W, 3) each."""
         camera, is_lit = self.shot.camera(instant, sensor), "shading" in names or "residual" in names
         finish = self.shot.finish(instant).with_background(picture_of(names) == "rgba")
         has_sky = shows_sky(finish.background)
@@ -142,7 +142,7 @@ class RasterStage:
         return self._finished(instant, camera, visibility, name)
 
     def _finished(self, instant: int, camera: Camera, visibility: Visibility, name: str) -> NDArray[np.uint8]:
-        """`rgb` or `rgba`, of the light that was painted last."""
+        """`rgb` or `rgba`, made from the light that was painted last."""
         finish = self.shot.finish(instant).with_background(name == "rgba")
         background = display_background(finish.background, camera.width, camera.height)
         radiance = self._canvas(camera.width * camera.height)
@@ -154,7 +154,7 @@ class RasterStage:
     def _paint(
         self, instant: int, sensor: int, camera: Camera, visibility: Visibility, has_sky: bool, radiance: Float32
     ) -> None:
-        """Fill `radiance` with the light of a picture, blurred where anything moves while the shutter is open."""
+        """Fill `radiance` with the light of a picture, blurred if anything moves during the exposure."""
         blur = Blur(self.arrangements, instant, sensor)
 
         def paint_moment(arranged: Arranged, camera: Camera, seen: Visibility, light: Float32) -> None:
@@ -163,7 +163,7 @@ class RasterStage:
 
         count = blur.count(self.at(instant), visibility)
         if count > 1:
-            self._baked.clear()  # what is packed is written over
+            self._baked.clear()  # packed data is overwritten
             blur.paint(count, paint_moment, radiance)
         else:
             self._paint_one(self.baked(instant), camera, visibility, has_sky, radiance)
@@ -180,7 +180,7 @@ class RasterStage:
         _paint_finely(paint_all, self.options.times, baked.geometry, camera, seen, radiance, NO_SPLIT)
 
     def _canvas(self, pixels: int) -> Float32:
-        """Room for the light of a picture, the same one every time: fresh memory costs as much as the sky."""
+        """The array for the light of a picture, reused each time, because fresh memory costs as much as the sky."""
         if pixels not in self._canvases:
             self._canvases.clear()
             self._canvases[pixels] = np.empty((pixels, 4), np.float32)
@@ -188,7 +188,7 @@ class RasterStage:
 
 
 def _mirror(baked: Baked, camera: Camera, seen: Visibility, wet: Wet | None, light: Float32) -> None:
-    """Add to the light of a picture (H * W, 4) what smooth surfaces mirror of things near them, and what wet ground does."""
+    """Add reflections of nearby things in smooth surfaces, and those in wet ground, to the light of a picture (H * W, 4)."""
     polished = mirror_in_polish(baked, camera, seen, light) if wet is None else NOWHERE
     mirror_in_panes(baked, camera, seen, polished, light)
     if wet is not None:
@@ -196,7 +196,7 @@ def _mirror(baked: Baked, camera: Camera, seen: Visibility, wet: Wet | None, lig
 
 
 def build_stage(shot: Shot, load: Load) -> RasterStage:
-    """The stage of a shot, with all models loaded. Raises RecipeError for options that it cannot have."""
+    """The stage of a shot, with all models loaded. Raises RecipeError for unsupported options."""
     options = parse_options(shot.engine_options)
     lenses = [sensor.intrinsics for sensor in shot.rig.sensors if sensor.lidar is None]
     longest = options.times * max((max(lens.width, lens.height) for lens in lenses), default=1)
@@ -211,8 +211,8 @@ def build_stage(shot: Shot, load: Load) -> RasterStage:
 def _paint_finely(
     paint: Paint, times: int, geometry: Geometry, camera: Camera, visibility: Visibility, radiance: Float32, split: Float32
 ) -> None:
-    """Fill `radiance` (H * W, 4) and `split` (H * W, C) with the means of what `paint` gives for `times` as many pixels each
-    way; `visibility` is truth's buffer for this camera.
+    """Fill `radiance` (H * W, 4) and `split` (H * W, C) with means of the results of `paint` at `times` the resolution;
+    `visibility` is truth's buffer for this camera.
     """
     if times == 1:
         paint(camera, visibility, radiance, split)
@@ -226,7 +226,7 @@ def _paint_finely(
 
 
 def larger(camera: Camera, times: int) -> Camera:
-    """The camera whose picture is the same with `times` as many pixels each way."""
+    """The camera with the same picture at `times` the resolution in each direction."""
     lens = camera.intrinsics
     scaled = {name: times * getattr(lens, name) for name in ("width", "height", "fx", "fy", "cx", "cy", "skew")}
     return Camera(lens.model_copy(update=scaled), camera.R, camera.t)

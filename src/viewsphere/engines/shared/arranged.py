@@ -21,18 +21,18 @@ from viewsphere.truth.moving import ROOMS, Ring, changed, differs_in_shape_only,
 from viewsphere.truth.raster.geometry import Geometry, placed_meshes, present
 
 STEPS = 16
-"""Time steps of models whose meshes are kept for the next instants."""
+"""Number of time steps of models whose meshes are cached for the next instants."""
 
 
 @dataclass(frozen=True, eq=False)
 class Arranged:
-    """The things of a shot at an instant. meshes[i] is the mesh of things[i], without triangles if that thing is not there.
+    """The things of a shot at an instant. meshes[i] is the mesh of things[i], without triangles if that thing is absent.
 
-    `whole` has the triangles of absent things, too. `geometry` is a new object only if some thing is elsewhere.
+    `whole` has the triangles of absent things, too. `geometry` is a new object only if some thing has moved.
 
-    moving: the things that move in the shot, or while its shutter is open. known: meshes that stand for `whole` where much
-    depends on a mesh; between two time steps, this is the nearer step's mesh. is_sequence: whether the shot is part of a
-    sequence; otherwise its pictures are unrelated.
+    moving: the things that move in the shot, or during its exposures. known: the meshes used instead of `whole` for results
+    that are costly to compute from a mesh; between two time steps, this is the nearer step's mesh. is_sequence: whether the
+    shot is part of a sequence; otherwise its pictures are unrelated.
     """
 
     things: tuple[Thing, ...]
@@ -54,11 +54,11 @@ class Arranged:
 
     @property
     def has_scenery(self) -> bool:
-        """Return whether there is any."""
+        """Return whether there is any scenery."""
         return self.targets < len(self.things)
 
     def changed_since(self, before: Arranged) -> list[int]:
-        """Return the indices of the same things that are elsewhere, or deformed."""
+        """Return the indices of the same things that have moved or deformed."""
         return changed(before.things, before.whole, self.things, self.whole)
 
 
@@ -78,17 +78,17 @@ class Look:
 
 @dataclass(frozen=True, eq=False)
 class Shown:
-    """Gives models at their time steps; the last `STEPS` are kept, so that what is shown again is the same object."""
+    """Gives models at their time steps; the latest `STEPS` are cached, so that a repeated request returns the same object."""
 
     load: Load
     soaked: float = 0.0
     _held: dict[Look, Mesh] = field(default_factory=dict[Look, Mesh])
 
     def mesh(self, thing: Thing, step: TimeStep, resting: Mesh) -> Mesh:
-        """A thing's mesh at a time step, which has in common with the mesh at rest what is equal."""
+        """A thing's mesh at a time step, which shares equal data with the mesh at rest."""
         look = Look(thing.model, step, thing.repaints)
         found = self._held.pop(look, None) or sharing(self._soaked(look.mesh(self.load)), resting)
-        self._held[look] = found  # the last used comes last
+        self._held[look] = found  # the most recently used comes last
         if len(self._held) > STEPS:
             del self._held[next(iter(self._held))]
         return found
@@ -99,9 +99,9 @@ class Shown:
 
 @dataclass(frozen=True, eq=False)
 class Arrangements:
-    """A shot's things at each of its instants; things that stand still are loaded and placed once.
+    """A shot's things at each of its instants; still things are loaded and placed once.
 
-    The triangles of the last few instants are kept: see `truth.moving.Ring`.
+    The triangles of the latest instants are cached: see `truth.moving.Ring`.
     """
 
     shot: Shot
@@ -113,7 +113,7 @@ class Arrangements:
 
     @classmethod
     def build(cls, shot: Shot, load: Load) -> Arrangements:
-        """Of a shot, with all its models loaded; `load` gives a model's normalised mesh."""
+        """The arrangements of a shot, with all its models loaded; `load` gives a model's normalised mesh."""
         ring = Ring(shot.scene.ground is not None, shot.label_alpha, keeps_scenery=not shot.sequence)
         soaked = 0.0 if shot.scene.wet is None else shot.scene.wet.amount
         meshes = _dressed(shot.things, placed_meshes(shot.things, load), soaked)
@@ -122,26 +122,26 @@ class Arrangements:
         return cls(shot, Shown(load, soaked), meshes, None, ring).of(shot)
 
     def of(self, shot: Shot) -> Arrangements:
-        """The arrangements of another shot of an equal `stage_key`, which share the loaded meshes."""
+        """The arrangements of another shot with an equal `stage_key`, which share the loaded meshes."""
         own = replace(self, shot=shot, _known={})
         return replace(own, floor=shot_floor(shot, lambda instant: own._meshes(shot.things_at(instant))))
 
     def at(self, instant: int) -> Arranged:
-        """The things as they stand at an instant, counted from 0 in the shot."""
+        """The things at an instant, counted from 0 in the shot."""
         known = self._known.pop(instant, None)
         things = self.shot.things_at(instant) if known is None else known.things
         meshes = self._meshes(things) if known is None else known.whole
         geometry = self.ring.at(things, meshes, self.floor)
         if known is None or known.geometry is not geometry:
             known = self._arranged(things, meshes, meshes, geometry)
-        self._known[instant] = known  # the last asked for comes last
+        self._known[instant] = known  # the most recently requested comes last
         if len(self._known) > ROOMS:
             del self._known[next(iter(self._known))]
         return known
 
     def during(self, instant: int, moment: float) -> Arranged:
-        """The things a moment after an instant (a `Sweep` has it) while the shutter is open. Its geometry is good
-        until this is called again.
+        """The things a moment after an instant (as in `Sweep`) during the exposure. The geometry is valid until the next call
+        of this method.
         """
         things = self.shot.things_during(instant, moment)
         known = self._meshes(things)
@@ -164,7 +164,7 @@ class Arrangements:
         return tuple(i for i, thing in enumerate(self.shot.things) if i in swept or not thing.motion.is_still)
 
     def _deformed(self, thing: Thing, steps: tuple[TimeStep | None, TimeStep | None, float], rest: Mesh, nearest: Mesh) -> Mesh:
-        """The mesh between two time steps, or the nearest where these are not made of the same triangles."""
+        """The mesh between two time steps, or the nearest one if these are not made of the same triangles."""
         before, after, share = steps
         if before is None or after is None or before == after:
             return nearest
@@ -172,13 +172,15 @@ class Arrangements:
         return blended(start, end, share) or nearest
 
     def _meshes(self, things: tuple[Thing, ...]) -> tuple[Mesh, ...]:
-        """Of these things, at the time steps that they show."""
+        """The meshes of these things, at the time steps that they show."""
         held = zip(things, self.meshes, strict=True)
         return tuple(mesh if now.step is None else self.shown.mesh(now, now.step, mesh) for now, mesh in held)
 
 
 def _dressed(things: Sequence[Thing], meshes: Sequence[Mesh], soaked: float) -> tuple[Mesh, ...]:
-    """The meshes with the pictures that things are painted with, and wet; things of one mesh and one paint share it."""
+    """The meshes with the textures that things are painted with, and wet if `soaked`; things with the same mesh and paint share
+    one.
+    """
     found: dict[tuple[int, tuple[Repaint, ...]], Mesh] = {}
     for thing, mesh in zip(things, meshes, strict=True):
         if (id(mesh), thing.repaints) not in found:
@@ -190,7 +192,7 @@ def _dressed(things: Sequence[Thing], meshes: Sequence[Mesh], soaked: float) -> 
 
 
 def blended(a: Mesh, b: Mesh, share: float) -> Mesh | None:
-    """A mesh at a share of the way from one to another that differs in shape only, else None."""
+    """A mesh at a share of the way from one to another that differs only in shape, otherwise None."""
     if not differs_in_shape_only(a, b):
         return None
     vertices, normals = ((1 - share) * x + share * y for x, y in ((a.vertices, b.vertices), (a.normals, b.normals)))

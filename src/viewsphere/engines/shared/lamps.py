@@ -17,19 +17,19 @@ from viewsphere.model.weather import Lamps
 Float = NDArray[np.float64]
 
 LENS, WINDOW = "lens", "window"
-"""Names of parts of scenery: what a lamp shines through, and what may be lit from inside."""
+"""Names of parts of scenery: the part through which a lamp shines, and the part that may be lit from inside."""
 
 GLOW = 9.0
 """Brightness by day of glowing surfaces except screens, as a factor."""
 
 SCREEN = "screen"
-"""Name of the material of screens, which people do not turn up at night."""
+"""Name of the material of screens, which are not brighter at night."""
 
 ROOM = (0.62, 0.42, 0.2)
-"""Radiance of a window that is lit from inside: linear."""
+"""Radiance of a window that is lit from inside, linear."""
 
 APART = 1.6
-"""Metres between the middles of triangles that belong to different windows."""
+"""Metres between the middles of triangles above which they belong to different windows."""
 
 BELOW = 0.06
 """Metres below its lens at which a lamp's light begins, so that the lens hides none."""
@@ -38,8 +38,10 @@ CONE = 150.0  # degrees: a street lamp lights its post and the road, not the sky
 
 
 def lamplight(scene: Scene, things: Sequence[Thing], meshes: Sequence[Mesh], middle: Float) -> Scene:
-    """The scene with the lamps of its place that are nearest to the world's origin as lights; `middle` (3,): that of the
-    targets, from which lights count. Which lamps shine does not depend on where targets and cameras are.
+    """The scene with lights for the lamps of its place that are nearest to the world's origin.
+
+    `middle` (3,) is the middle of the targets, from which lights are measured. The selection of lamps does not depend on the
+    places of targets and cameras.
     """
     lamps = scene.lamps
     if lamps is None or not lamps.most:
@@ -50,7 +52,7 @@ def lamplight(scene: Scene, things: Sequence[Thing], meshes: Sequence[Mesh], mid
 
 
 def _lenses(thing: Thing, mesh: Mesh) -> list[Float]:
-    """Return the places, in world metres, where light begins below a thing's lens; none if it has no lens or is not there."""
+    """Return the places, in world metres, where light begins below a thing's lens; empty if it has no lens or is absent."""
     if LENS not in mesh.parts or not thing.is_there:
         return []
     own = mesh.triangles[mesh.triangle_part == mesh.parts.index(LENS)]
@@ -70,8 +72,8 @@ def _spot(place: Float, lamps: Lamps) -> SpotLight:
 
 
 def lit(things: Sequence[Thing], meshes: Sequence[Mesh], lamps: Lamps) -> tuple[Mesh, ...]:
-    """The things' meshes whose glowing materials shine as at night; of scenery, a share of its windows is lit. Things of one
-    mesh share it, but for those with windows.
+    """The things' meshes with glowing materials as bright as at night; in scenery, a share of the windows is lit. Things with
+    the same mesh share one, except things with windows.
     """
     found = {id(mesh): _glowing(mesh) for mesh in meshes}
     return tuple(_with_windows(found[id(mesh)], thing, lamps.windows) for thing, mesh in zip(things, meshes, strict=True))
@@ -108,7 +110,9 @@ def _with_windows(mesh: Mesh, thing: Thing, share: float) -> Mesh:
 
 
 def _are_lit(mesh: Mesh, own: NDArray[np.intp], thing: Thing, share: float) -> NDArray[np.bool_]:
-    """Return a mask of these triangles (n,), true on lit windows; the draw of each window follows from the thing's place."""
+    """Return a mask of these triangles (n,), true on lit windows; the random draw for each window is keyed by the thing's
+    place.
+    """
     middles = mesh.vertices[mesh.triangles[own]].mean(axis=1)
     step = np.linalg.norm(np.diff(middles, axis=0, prepend=middles[:1]), axis=1)
     window = np.cumsum(step > APART)

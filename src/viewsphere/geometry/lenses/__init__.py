@@ -1,7 +1,7 @@
 """Lens models, one file each: a lens gives a ray for each pixel and a pixel for each point.
 
-A file holds `LENS = LensSpec(...)`, whose name in recipes is the file's. Nothing outside this package depends on which model a
-lens is: it uses the methods and the properties of `Lens`, which `lens_of` returns.
+A file holds `LENS = LensSpec(...)`; the file's name is the lens's name in recipes. Nothing outside this package depends on the
+lens model: callers use the methods and properties of `Lens`, which `lens_of` returns.
 """
 
 # ruff: noqa: D102, the classes in `viewsphere.model` say what each name of the protocols means
@@ -39,14 +39,14 @@ Window = tuple[int, int, int, int]
 """Pixels [x0, x1) x [y0, y1) as (x0, y0, x1, y1); may reach outside the image."""
 
 NEAR = 1e-6
-"""Distance in front of the camera, metres, from which on geometry is projected; nearer parts are cut off."""
+"""Distance in front of the camera, in metres, from which geometry is projected; nearer parts are cut off."""
 
 DEFAULT = "pinhole"
 """The lens of intrinsics without `distortion`."""
 
 
 class LensParameters(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False, defer_build=True):
-    """The parameters of a lens besides its camera matrix K; each lens model has a class of its own."""
+    """The parameters of a lens besides its camera matrix K; each lens model has its own class."""
 
     model: str = Field(description="the lens model")
 
@@ -56,7 +56,7 @@ class LensParameters(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False
 
     @property
     def numbers(self) -> tuple[float, ...]:
-        """All parameters in order, as formats list them that have one list of numbers."""
+        """All parameters in order, for formats that store them as one list of numbers."""
         values = (value for name, value in self if name != "model")
         return tuple(float(number) for value in values for number in np.ravel(value))
 
@@ -69,12 +69,12 @@ class Rays(NamedTuple):
 
 
 def central(directions: Float) -> Rays:
-    """The rays of these directions that begin at the camera's centre."""
+    """The rays that begin at the camera's centre and have these directions."""
     return Rays(np.broadcast_to(np.zeros(3), directions.shape), directions)
 
 
 class OpenCVLens(NamedTuple):
-    """A lens as OpenCV's functions take it besides K: `cv2.fisheye` or `cv2.projectPoints`, and `distCoeffs`."""
+    """A lens in the form that OpenCV's functions take besides K: `cv2.fisheye` or `cv2.projectPoints`, and `distCoeffs`."""
 
     is_fisheye: bool
     coefficients: tuple[float, ...]
@@ -146,7 +146,7 @@ class LensSpec(BaseModel):
 
 @dataclass(frozen=True, eq=False)
 class Lens:
-    """A lens model with its parameters and camera matrix, in front of a picture of one size."""
+    """A lens model with its parameters and camera matrix, for a picture of one size."""
 
     spec: LensSpec
     intrinsics: Intrinsics
@@ -159,12 +159,12 @@ class Lens:
 
     @property
     def is_linear(self) -> bool:
-        """Return whether pixels are K times points, as a pinhole's."""
+        """Return whether pixels are K times points, as for a pinhole."""
         return self.spec.is_linear
 
     @property
     def has_unit_rays(self) -> bool:
-        """Return whether ray directions are unit vectors, which may look anywhere, instead of vectors of z = 1."""
+        """Return whether ray directions are unit vectors, which may point anywhere, instead of vectors of z = 1."""
         return self.spec.has_unit_rays
 
     @property
@@ -174,12 +174,14 @@ class Lens:
 
     @property
     def ray_cells(self) -> int | None:
-        """Cells a side of a face of the cube in which rays are indexed; None: of about two pixels at the axis."""
+        """Number of cells along a side of each cube face that indexes the rays; None means cells of about two pixels at the
+        axis.
+        """
         return self.spec.ray_cells
 
     @cached_property
     def opencv(self) -> OpenCVLens | None:
-        """The same lens in OpenCV's terms, which many formats share; None where OpenCV has no such model."""
+        """The same lens in OpenCV's terms, which many formats share; None if OpenCV has no such model."""
         return None if self.spec.as_opencv is None else self.spec.as_opencv(self)
 
     @property
@@ -190,13 +192,13 @@ class Lens:
 
     @property
     def flat_record(self) -> dict[str, Any] | None:
-        """The model, and its parameters as one list of `coefficients`, None for a pinhole."""
+        """The model with its parameters as one list of `coefficients`; None for a pinhole."""
         own = self.intrinsics.distortion
         return None if own is None else {"model": own.model, "coefficients": list(own.numbers)}
 
     def rays(self, xy: ArrayLike) -> Rays:
-        """The rays through positions (..., 2) of the picture. Directions are NaN where there is none, and have z = 1 unless
-        the lens `has_unit_rays`.
+        """The rays through positions (..., 2) of the picture. Directions are NaN where the lens has no ray, and have z = 1
+        unless the lens `has_unit_rays`.
         """
         at = np.ascontiguousarray(xy, np.float64)
         origins, directions = self.spec.rays(self, at.reshape(-1, 2))
@@ -206,7 +208,7 @@ class Lens:
     def directions(self, subdivision: int = 1, window: Window | None = None) -> Float:
         """Directions of the rays through sample centres, (H, W, 3): `subdivision` x `subdivision` samples a pixel.
 
-        `window` (x0, y0, x1, y1) replaces the image by other pixels, which may lie outside it.
+        `window` (x0, y0, x1, y1) selects other pixels instead of the image, and may reach outside it.
         """
         i = self.intrinsics
         x0, y0, x1, y1 = (subdivision * edge for edge in window or (0, 0, i.width, i.height))
@@ -237,8 +239,10 @@ class Lens:
     def bounds(
         self, R: Float, t: Float, vertices: Float, is_used: NDArray[np.bool_], triangles: NDArray[np.int32]
     ) -> tuple[Bounds | None, bool]:
-        """The 2D box (x0, y0, x1, y1) of what the lens shows of triangles (n, 3), whose corners are world vertices (v, 3), None
-        if that is nothing; and whether it shows all of them. `is_used`: the vertices that triangles use.
+        """The 2D box (x0, y0, x1, y1) of the parts of triangles (n, 3) that the lens shows, and whether it shows all of them.
+
+        The corners are world vertices (v, 3); `is_used` masks the vertices that triangles use. The box is None if the lens
+        shows no part.
         """
         if self.spec.bounds is None:
             from viewsphere.geometry.lenses.shared.outline import bounds
@@ -264,7 +268,7 @@ def angles_off_axis(directions: Float) -> Float:
 
 
 class Intrinsics(Protocol):
-    """Image size in pixels, the camera matrix K (3, 3), its numbers, and the lens; None for `distortion` means a pinhole."""
+    """Image size in pixels, the camera matrix K (3, 3), its entries, and the lens; a `distortion` of None means a pinhole."""
 
     @property
     def width(self) -> int: ...
@@ -311,14 +315,16 @@ class Camera(Protocol):
 
 @lru_cache(maxsize=64)
 def lens_of(intrinsics: Intrinsics) -> Lens:
-    """The lens of these intrinsics. Raises PluginError where a third party's model is not installed, or not valid."""
+    """The lens of these intrinsics. Raises PluginError if a third-party model is not installed or not valid."""
     own = intrinsics.distortion
     spec = _spec(DEFAULT if own is None else own.model)
     return Lens(spec, intrinsics, LensParameters(model=DEFAULT) if own is None else own)
 
 
 def focal_from_fov(fov: float, extent: float, parameters: LensParameters | None = None) -> float:
-    """The focal length, pixels, with which `extent` pixels span the angle `fov` (radians); without parameters a pinhole's."""
+    """The focal length in pixels at which `extent` pixels span the angle `fov` (radians); for a pinhole if no parameters are
+    given.
+    """
     focal = _spec(DEFAULT if parameters is None else parameters.model).focal
     return extent / (2 * math.tan(fov / 2)) if focal is None else focal(fov, extent)
 
@@ -329,14 +335,14 @@ def lens_parameters(model: str, **values: Any) -> LensParameters:
 
 
 def read_parameters(value: Any) -> Any:
-    """The parameters of a lens model that are given as a mapping with its name as `model`; any other value unchanged."""
+    """The parameters of a lens model, read from a mapping that names it as `model`; any other value is returned unchanged."""
     if not isinstance(value, Mapping) or not isinstance(value.get("model"), str):
         return value
     return _spec(value["model"]).parameters.model_validate(dict(value))
 
 
 def opencv_parameters(coefficients: tuple[float, ...], is_fisheye: bool = False) -> LensParameters:
-    """The parameters of a lens of OpenCV's: k1 k2 k3 k4 of `cv2.fisheye`, else k1 k2 p1 p2 [k3 [k4 k5 k6]]."""
+    """The parameters of an OpenCV lens: k1 k2 k3 k4 of `cv2.fisheye`, otherwise k1 k2 p1 p2 [k3 [k4 k5 k6]]."""
     return lens_parameters("fisheye" if is_fisheye else "brown_conrady", coefficients=coefficients)
 
 

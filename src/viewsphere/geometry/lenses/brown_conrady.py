@@ -59,7 +59,7 @@ def bounds(
 
 
 def as_opencv(lens: Any) -> OpenCVLens:
-    """The coefficients as they are."""
+    """The coefficients, unchanged."""
     return OpenCVLens(False, lens.parameters.coefficients)
 
 
@@ -67,8 +67,8 @@ def limit(coefficients: tuple[float, ...]) -> float:
     """The radius r/z, which may be infinite, up to which the lens map is one-to-one.
 
     Beyond it the distortion polynomial folds the picture back on itself, as no real lens does. The map's Jacobian is symmetric
-    (the map is the gradient of a potential). Inside the limit it is positive definite all around, so the potential is convex
-    and no two rays meet in a pixel.
+    (the map is the gradient of a potential). Inside the limit it is positive definite everywhere, so the potential is convex
+    and no two rays share a pixel.
     """
     return _limit(tuple(padded(coefficients, 8).tolist()))
 

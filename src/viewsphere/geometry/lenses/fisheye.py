@@ -30,7 +30,7 @@ class Fisheye(LensParameters, frozen=True):
 
 
 def rays(lens: Lens, xy: Float) -> Rays:
-    """Unit rays, which may look sideways or back; NaN beyond the largest angle."""
+    """Unit rays, which may point sideways or back; NaN beyond the largest angle."""
     from viewsphere.geometry.lenses.shared import kernels_lens as kernels
 
     k, out = lens.parameters.coefficients, np.empty((len(xy), 3))
@@ -39,7 +39,7 @@ def rays(lens: Lens, xy: Float) -> Rays:
 
 
 def project(lens: Lens, points: Float) -> Float:
-    """Positions of points up to the largest angle, which may lie behind the camera."""
+    """Positions of points up to the largest angle, including points behind the camera."""
     from viewsphere.geometry.lenses.shared import kernels_lens as kernels
 
     i, k, out = lens.intrinsics, lens.parameters.coefficients, np.empty((len(points), 2))
@@ -57,12 +57,12 @@ def bounds(
 
 
 def focal(fov: float, extent: float) -> float:
-    """The focal length without coefficients, where the distance from the centre is the angle times it."""
+    """The focal length without coefficients: the distance from the centre is this length times the angle."""
     return extent / fov
 
 
 def as_opencv(lens: Any) -> OpenCVLens:
-    """The coefficients as they are."""
+    """The coefficients, unchanged."""
     return OpenCVLens(True, lens.parameters.coefficients)
 
 

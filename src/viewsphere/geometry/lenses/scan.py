@@ -16,15 +16,15 @@ Float = NDArray[np.float64]
 Degrees = Annotated[float, Field(ge=-90, le=90)]
 
 CELLS = 128
-"""Cells along a side of the cube around a scan: smaller ones are slower, as rows of rays are sparse."""
+"""Number of cells along a side of the cube around a scan; smaller cells are slower, because rows of rays are sparse."""
 
 
 class Scan(LensParameters, frozen=True):
-    """The rays of a LiDAR: every ring, a row of the picture, has one elevation, every column one azimuth.
+    """The rays of a LiDAR: each ring (a row of the picture) has one elevation, each column one azimuth.
 
-    A direction's azimuth is counted to the right from that of the picture's middle, `turn_deg` to the right of the z axis; K
-    takes it (radians) to columns, and a ring's number + 0.5 to rows. Between rings, and beyond the outermost by the step next
-    to them, elevations go on evenly; a lone ring's rows are a degree apart.
+    Azimuths are measured to the right from the picture's middle, which is `turn_deg` to the right of the z axis. K maps an
+    azimuth (radians) to a column, and a ring's number + 0.5 to a row. Elevations are linear between rings; beyond the outermost
+    rings they continue with the nearest step. The rows of a single ring are a degree apart.
     """
 
     model: Literal["scan"] = "scan"
@@ -45,7 +45,7 @@ class Scan(LensParameters, frozen=True):
 
 
 def rays(lens: Lens, xy: Float) -> Rays:
-    """Unit rays; NaN beyond a whole turn around the scan's middle, and beyond straight up and down."""
+    """Unit rays; NaN beyond a full turn around the scan's middle, and beyond straight up and down."""
     from viewsphere.geometry.lenses.shared import kernels_lens as kernels
 
     out = np.empty((len(xy), 3))
@@ -54,7 +54,7 @@ def rays(lens: Lens, xy: Float) -> Rays:
 
 
 def project(lens: Lens, points: Float) -> Float:
-    """Positions of points in all directions but straight up and down."""
+    """Positions of points in all directions except straight up and down."""
     from viewsphere.geometry.lenses.shared import kernels_lens as kernels
 
     i, out = lens.intrinsics, np.empty((len(points), 2))
@@ -66,7 +66,7 @@ def project(lens: Lens, points: Float) -> Float:
 def bounds(
     lens: Lens, R: Float, t: Float, vertices: Float, is_used: NDArray[np.bool_], triangles: NDArray[np.int32]
 ) -> tuple[Bounds | None, bool]:
-    """The box of azimuths and rows: the full circle if the triangles span it, or cross the first and last column."""
+    """The box of azimuths and rows; the full circle if the triangles span it, or cross both the first and the last column."""
     from viewsphere.geometry.lenses.shared import kernels_scan
 
     room, (k, skew) = np.empty((len(vertices), 5)), (lens.intrinsics.K, lens.intrinsics.skew)
@@ -77,13 +77,13 @@ def bounds(
 
 
 def field_of_view(lens: Lens) -> tuple[float, float]:
-    """All columns, and from the lowest to the highest ring."""
+    """The angle across all columns, and the angle from the lowest to the highest ring."""
     rings = lens.parameters.elevations_deg
     return math.degrees(lens.intrinsics.width / lens.intrinsics.fx), rings[0] - rings[-1]
 
 
 def _angles(scan: Scan) -> Float:
-    """The azimuth of the middle and the elevations, radians, of two rings at least."""
+    """The azimuth of the middle and the elevations, in radians, of at least two rings."""
     lone = (scan.elevations_deg[0] - 1.0,) if len(scan.elevations_deg) == 1 else ()
     return np.array([math.radians(angle) for angle in (*scan.numbers, *lone)])
 

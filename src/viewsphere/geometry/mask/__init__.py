@@ -1,7 +1,6 @@
-"""Masks as COCO keeps them: run-length codes and polygons, both exact.
+"""Masks in COCO's representations: run-length codes and polygons, both exact.
 
-COCO's own rasteriser decides what is right for both:
-https://github.com/cocodataset/cocoapi/blob/master/common/maskApi.c.
+COCO's own rasteriser is the reference for both: https://github.com/cocodataset/cocoapi/blob/master/common/maskApi.c.
 """
 
 from __future__ import annotations
@@ -25,15 +24,15 @@ def encode_rle(mask: Mask) -> str:
 
 
 def decode_rle(height: int, width: int, counts: str) -> Mask:
-    """The (height, width) bool mask of a compressed run-length code; raises ValueError when it does not fill the image."""
+    """The (height, width) bool mask of a compressed run-length code; raises ValueError if the code does not fill the image."""
     from viewsphere.geometry.mask.kernels_mask import draw_runs
 
     return draw_runs(rle_runs(height, width, counts), height, width)
 
 
 def rle_runs(height: int, width: int, counts: str) -> Runs:
-    """The run lengths (column-major, first of pixels that are not in the mask) of a compressed code, without its pixels;
-    raises ValueError when they do not fill the image.
+    """The run lengths of a compressed code, without decoding its pixels: column-major, the first run outside the mask. Raises
+    ValueError if they do not fill the image.
     """
     from viewsphere.geometry.mask.kernels_mask import read_runs
 
@@ -45,7 +44,7 @@ def rle_runs(height: int, width: int, counts: str) -> Runs:
 
 
 def rle_of_runs(height: int, width: int, runs: Runs) -> str:
-    """The one compressed code of run lengths that fill the image; runs of no pixels count with their neighbours."""
+    """The canonical compressed code of run lengths that fill the image; empty runs are merged with their neighbours."""
     from pycocotools import mask as coco
 
     ends = np.cumsum(runs)
@@ -57,8 +56,8 @@ def rle_of_runs(height: int, width: int, runs: Runs) -> str:
 
 
 def rle_of_polygons(height: int, width: int, rings: Sequence[Sequence[float]]) -> str:
-    """The one compressed code of all that lies in any of the polygons [x0, y0, x1, y1, ...], as COCO's rasteriser draws them;
-    no pixel is drawn. Corners far from the image are the caller's to refuse: pycocotools does not check its input.
+    """The canonical compressed code of the union of polygons [x0, y0, x1, y1, ...], as COCO's rasteriser draws them; no mask is
+    decoded. The caller must refuse corners far from the image, because pycocotools does not check its input.
     """
     from pycocotools import mask as coco
 
@@ -83,7 +82,9 @@ def rle_box(height: int, width: int, counts: str) -> tuple[int, int, int, int] |
 
 
 def _code(height: int, width: int, counts: str) -> Any:
-    """The code as pycocotools takes it; checked before, since pycocotools reads beyond the end of an incomplete code."""
+    """The code in the form that pycocotools takes. It is checked first, since pycocotools reads beyond the end of an incomplete
+    code.
+    """
     code = counts.encode("ascii", "replace")
     if not code or min(code) < 48 or max(code) > 111 or (code[-1] - 48) & 32:
         raise ValueError(f"RLE: expected a run-length code of {width} x {height} pixels, found {counts[:40]!r}")
@@ -91,7 +92,9 @@ def _code(height: int, width: int, counts: str) -> Any:
 
 
 def rle_of_part(height: int, width: int, part: Mask, x0: int, y0: int) -> str:
-    """`encode_rle` of a (height, width) mask whose pixels all lie in a part of it (h, w), which begins at column x0, row y0."""
+    """`encode_rle` of a (height, width) mask whose pixels are all inside a part of it (h, w), which begins at column x0, row
+    y0.
+    """
     from pycocotools import mask as coco
 
     ends = _ends(height, width, part, x0, y0)
@@ -104,7 +107,7 @@ def rle_of_part(height: int, width: int, part: Mask, x0: int, y0: int) -> str:
 
 
 def _ends(height: int, width: int, part: Mask, x0: int, y0: int) -> NDArray[np.intp]:
-    """Indices in column-major order at which the mask begins and ends to hold."""
+    """Indices in column-major order at which runs of the mask begin and end."""
     own, columns = part.shape
     rows = own if own == height else own + 1  # a gap between columns unless they touch
     inside = np.zeros(columns * rows + 2, np.bool_)
@@ -125,10 +128,9 @@ def mask_box(mask: Mask) -> tuple[int, int, int, int] | None:
 def mask_polygons(mask: Mask) -> list[list[float]]:
     """COCO polygons [x0, y0, x1, y1, ...] of a (H, W) bool mask, one for each 4-connected component.
 
-    The rings run along pixel corners, clockwise as seen, without collinear corners; each hole is joined to the
-    boundary above it by a vertical bridge of no width. So pycocotools' `frPyObjects` and `merge` give back
-    the identical mask, and the shoelace areas sum to the number of pixels. Islands in holes are components
-    of their own. Empty for an empty mask.
+    The rings run along pixel corners, clockwise as displayed, without collinear corners; each hole is joined to the boundary
+    above it by a vertical bridge of zero width. So pycocotools' `frPyObjects` and `merge` return the identical mask, and the
+    shoelace areas sum to the number of pixels. Islands in holes are components of their own. Empty for an empty mask.
     """
     from viewsphere.geometry.mask.kernels_mask import trace_rings
 

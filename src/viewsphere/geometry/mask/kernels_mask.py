@@ -6,19 +6,17 @@ import numpy as np
 
 from viewsphere.kernels.jit import inner, njit
 
-# Headings: 0 right, 1 down, 2 left, 3 up. The foreground lies on the right hand of the walk.
+# Headings: 0 right, 1 down, 2 left, 3 up. The foreground is to the right of the walk.
 STEP_X = (1, 0, -1, 0)
 STEP_Y = (0, 1, 0, -1)
-# The pixels ahead of corner (x, y), as offsets of (row, column): on the left and on the right hand.
+# The pixels ahead of corner (x, y), as offsets of (row, column): left and right of the walk.
 LEFT_ROW, LEFT_COLUMN = (-1, 0, 0, -1), (0, 0, -1, -1)
 RIGHT_ROW, RIGHT_COLUMN = (0, 0, -1, -1), (0, -1, -1, 0)
 
 
 @inner
 def _turn(mask, x, y, heading):
-    """The heading after corner (x, y) of the padded mask; at a diagonal touch the walk stays with its own
-    pixel.
-    """
+    """The heading after corner (x, y) of the padded mask; at a diagonal contact, the walk stays with its current pixel."""
     if not mask[y + RIGHT_ROW[heading], x + RIGHT_COLUMN[heading]]:
         return (heading + 1) % 4
     if mask[y + LEFT_ROW[heading], x + LEFT_COLUMN[heading]]:
@@ -28,7 +26,7 @@ def _turn(mask, x, y, heading):
 
 @inner
 def _push(ring, start, count, x, y):
-    """Append a corner to the ring that began at `start`; a corner on the way straight on is replaced."""
+    """Append a corner to the ring that began at `start`; if the last corner is on a straight line, replace it."""
     if count - start >= 2:
         ax, ay = ring[count - 2]
         bx, by = ring[count - 1]
@@ -41,12 +39,12 @@ def _push(ring, start, count, x, y):
 
 @inner
 def _mark_loops(mask, seen, hole_below):
-    """Walk every loop once: mark its horizontal edges, note each hole at the corner above it; returns the number
-    of edges and rings.
+    """Walk each loop once, mark its horizontal edges, and record each hole at the corner above it. Return the numbers of edges
+    and rings.
 
-    A loop's first edge in raster order has foreground below for an outer ring and above for a hole. From a
-    hole's first corner the line straight up stays inside the foreground until it meets the boundary of the
-    same component: the hole is joined there. `seen` is 2 where an outer ring starts.
+    A loop's first edge in raster order has foreground below for an outer ring and above for a hole. From a hole's first corner
+    the line straight up stays inside the foreground until it meets the boundary of the same component: the hole is joined
+    there. `seen` is 2 where an outer ring starts.
     """
     edges, rings = 0, 0
     height, width = mask.shape
@@ -82,7 +80,7 @@ def _mark_loops(mask, seen, hole_below):
 
 @inner
 def _walk(mask, hole_below, ring, count, sx, sy, stack):
-    """Append the outer ring that starts at (sx, sy) heading right, its holes joined by vertical bridges."""
+    """Append the outer ring that starts at (sx, sy) heading right, with its holes joined by vertical bridges."""
     start, depth = count, 0
     x, y, heading = sx, sy, 0
     count = _push(ring, start, count, x, y)
@@ -91,7 +89,7 @@ def _walk(mask, hole_below, ring, count, sx, sy, stack):
         y += STEP_Y[heading]
         turned = _turn(mask, x, y, heading)
         if depth and x == stack[depth - 1, 0] and y == stack[depth - 1, 2] and heading == 2:
-            # Back at the hole's first corner: return over the bridge, go on where the walk left off.
+            # Back at the hole's first corner: return over the bridge and resume the walk.
             depth -= 1
             count = _push(ring, start, count, x, y)
             y, heading = stack[depth, 1], stack[depth, 3]
@@ -142,7 +140,9 @@ def trace_rings(mask):
 
 @njit(_nrt=True)
 def read_runs(codes, size):
-    """The run lengths of a compressed code's characters, and whether the code is whole and they are `size` pixels together."""
+    """The run lengths encoded by a compressed code's characters, and whether the code is complete and the runs sum to `size`
+    pixels.
+    """
     runs = np.zeros(len(codes) + 1, np.int64)
     count, position, i = 0, 0, 0
     while i < len(codes):

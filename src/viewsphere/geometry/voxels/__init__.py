@@ -12,10 +12,10 @@ Rows = NDArray[np.int64]
 
 
 def touch(points: Float, triangles: NDArray[np.int32], rows: Rows, owner: Cells, filled: Codes, value: int) -> None:
-    """Give the cells of `owner` (X, Y, Z) that are nobody's, -1, to the first of these rows of triangles that has a part in
-    them, and write the value to `filled`.
+    """Assign each unowned (-1) cell of `owner` (X, Y, Z) to the first of these rows of triangles that overlaps it, and write
+    the value to `filled`.
 
-    points (V, 3) are counted in cells. Cells are half-open: a point on the border of two belongs to the farther one.
+    points (V, 3) are in units of cells. Cells are half-open: a point on the border of two cells belongs to the farther one.
     """
     from viewsphere.geometry.voxels import kernels_voxels as kernels
 
@@ -23,8 +23,9 @@ def touch(points: Float, triangles: NDArray[np.int32], rows: Rows, owner: Cells,
 
 
 def fill(points: Float, triangles: NDArray[np.int32], rows: Rows, owner: Cells, filled: Codes, value: int) -> None:
-    """Likewise the cells whose centres lie inside of closed surfaces, made of these rows of triangles: where their winding
-    number is not 0, so parts of an object may reach into one another.
+    """Assign the unowned cells whose centres are inside closed surfaces made of these rows of triangles, as `touch` does.
+
+    A cell is inside if the winding number is not 0, so parts of an object may overlap.
     """
     from viewsphere.geometry.voxels import kernels_voxels as kernels
 
@@ -41,7 +42,8 @@ def fill(points: Float, triangles: NDArray[np.int32], rows: Rows, owner: Cells, 
 
 
 def heights(points: Float, triangles: NDArray[np.int32], rows: Rows, size: tuple[int, int]) -> tuple[Float, Float]:
-    """Return the first and the last crossing of these rows of triangles on each vertical line through cells' centres, in cells.
+    """Return the first and the last crossing of these rows of triangles on each vertical line through the centres of cells, in
+    cells.
 
     The lines are along the middle axis of a grid of this size (ahead, right). Lines without a crossing have inf and -inf.
     """
@@ -53,9 +55,9 @@ def heights(points: Float, triangles: NDArray[np.int32], rows: Rows, size: tuple
 
 
 def closed(vertices: NDArray[np.float32], triangles: NDArray[np.int32]) -> NDArray[np.bool_]:
-    """Return a mask of the triangles (T,) that belong to a closed piece: each edge is passed as often one way as the other.
+    """Return a mask of the triangles (T,) that belong to a closed piece: each edge is used equally often in both directions.
 
-    Vertices in one place are one, and shared vertices join triangles to pieces.
+    Vertices at the same place count as one, and shared vertices join triangles into pieces.
     """
     from viewsphere.geometry.voxels import kernels_voxels as kernels
 
@@ -74,7 +76,7 @@ def closed(vertices: NDArray[np.float32], triangles: NDArray[np.int32]) -> NDArr
 
 
 def _welded(vertices: NDArray[np.float32]) -> Rows:
-    """Of each vertex the number of the place where it is, (V,) int64."""
+    """The number of each vertex's place, (V,) int64; vertices at the same place share a number."""
     x, y, z = (vertices + np.float32(0)).T  # -0.0 becomes 0.0
     order = np.lexsort((x, y, z))
     places = vertices[order]

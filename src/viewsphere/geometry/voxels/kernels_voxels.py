@@ -1,4 +1,4 @@
-"""Kernels of voxels; points are counted in cells, and cell (i, j, k) has those from i, j, k on."""
+"""Kernels of voxels. Points are in units of cells; cell (i, j, k) starts at the point (i, j, k)."""
 
 from __future__ import annotations
 
@@ -7,24 +7,24 @@ import math
 from viewsphere.kernels.jit import inner, njit
 
 SLACK = 1e-9
-"""Cells by which rounding may move where a plane crosses a column."""
+"""Rounding error, in cells, of the place where a plane crosses a column."""
 
 
 @inner
 def separated(p, q, r, reach):
-    """Return whether an interval around 0 ends before three values begin."""
+    """Return whether the range of three values is disjoint from the interval [-reach, reach]."""
     return min(p, q, r) > reach or max(p, q, r) < -reach
 
 
 @inner
 def edge_apart(s, t, au, av, bu, bv, cu, cv):
-    """Return whether an edge (s, t) tells a triangle apart from the square around 0, as seen along an axis."""
+    """Return whether an edge (s, t) separates a triangle from the square around 0, as seen along an axis."""
     return separated(s * av - t * au, s * bv - t * bu, s * cv - t * cu, 0.5 * (abs(s) + abs(t)))
 
 
 @inner
 def edges_apart(au, av, bu, bv, cu, cv):
-    """Return whether any edge of a triangle tells it apart from the square around 0, as seen along an axis."""
+    """Return whether any edge of a triangle separates it from the square around 0, as seen along an axis."""
     return (
         edge_apart(bu - au, bv - av, au, av, bu, bv, cu, cv)
         or edge_apart(cu - bu, cv - bv, au, av, bu, bv, cu, cv)
@@ -41,13 +41,13 @@ def extent(points, triangles, t, axis):
 
 @inner
 def cells(low, high, count):
-    """The cells of a grid of so many in which an extent lies."""
+    """The cells, in a grid with this many, that an extent overlaps."""
     return range(math.floor(max(low, 0.0)), math.floor(min(high, count - 1.0)) + 1)
 
 
 @inner
 def normal_of(points, triangles, t, u, v):
-    """The component of a triangle's normal along the axis after u and v, times twice its area."""
+    """The component of a triangle's normal along the axis after u and v, scaled by twice the triangle's area."""
     i, j, k = triangles[t, 0], triangles[t, 1], triangles[t, 2]
     p, q = points[j, u] - points[i, u], points[j, v] - points[i, v]
     r, s = points[k, u] - points[i, u], points[k, v] - points[i, v]
@@ -92,11 +92,12 @@ def columns(points, triangles, t, w, owner, filled, value):
 
 @njit
 def touch(points, triangles, rows, owner, filled, value):
-    """Give every cell of `owner` (X, Y, Z) that is still -1 and that a triangle of these rows has a part in to the first such
-    triangle, and write the value to `filled`.
+    """Assign each unowned (-1) cell of `owner` (X, Y, Z) to the first triangle of these rows that overlaps it, and write the
+    value to `filled`.
 
-    It is exact but for rounding: separating axes (Akenine-Moller 2001), of the cells in the columns that the triangle's
-    projection meets along the axis that it faces most. The plane and the box of the triangle are what bounds a column.
+    The test is exact except for rounding: separating axes (Akenine-Moller 2001) for the cells in the columns that the
+    triangle's projection meets. The columns are along the axis that the triangle faces most. The plane and the box of the
+    triangle bound each column.
     """
     for t in rows:
         x = abs(normal_of(points, triangles, t, 1, 2))
@@ -108,8 +109,8 @@ def touch(points, triangles, rows, owner, filled, value):
 
 @inner
 def turns(px, py, qx, qy, x, y):
-    """1 where the edge from p to q passes right of a point upwards, -1 downwards, else 0; of two triangles that share an edge
-    always the opposite, as both compute the same.
+    """1 if the edge from p to q passes right of a point upwards, -1 if downwards, otherwise 0. Two triangles that share an edge
+    always get opposite values, because both compute the same expression.
     """
     if (py > y) == (qy > y):
         return 0
@@ -133,7 +134,7 @@ def around(points, triangles, t, u, v, x, y):
 
 @inner
 def crossing(points, triangles, t, u, v, w, x, y):
-    """Return the coordinate where a line along axis w crosses a triangle around it.
+    """Return the coordinate where a line along axis w crosses a triangle whose projection contains the line's point.
 
     x, y: the line's point in the plane of axes u and v.
     """
@@ -151,7 +152,7 @@ def crossing(points, triangles, t, u, v, w, x, y):
 
 @inner
 def span(points, triangles, t, axis, count):
-    """The cells [first, stop) along an axis whose centres a triangle may have."""
+    """The cells [first, stop) along an axis whose centres may be inside a triangle's extent."""
     p, q, r = points[triangles[t, 0], axis], points[triangles[t, 1], axis], points[triangles[t, 2], axis]
     first, stop = max(math.ceil(min(p, q, r) - 0.5), 0.0), min(math.floor(max(p, q, r) - 0.5) + 1.0, float(count))
     return int(min(first, float(count))), int(max(stop, 0.0))
@@ -159,8 +160,10 @@ def span(points, triangles, t, axis, count):
 
 @njit
 def wind(points, triangles, rows, winding):
-    """Add to `winding` (X, Y, Z) int32, at the first cell of each line along the last axis whose centre is behind a crossing of
-    a triangle of these rows, how often its edges go around the line; lines go through the cells' centres.
+    """Add the winding of triangles' edges around each line along the last axis to `winding` (X, Y, Z) int32.
+
+    The lines go through the cells' centres. Each value is added at the first cell of the line whose centre is behind the
+    crossing of a triangle of these rows.
     """
     for t in rows:
         x0, x1 = span(points, triangles, t, 0, winding.shape[0])
@@ -176,8 +179,9 @@ def wind(points, triangles, rows, winding):
 
 @njit
 def fill(winding, first, triangle, owner, filled, value):
-    """Give the cells whose centres a closed surface is around, by `wind` of a part of the grid from the cell `first` on, to a
-    triangle where they are nobody's yet, and write the value to `filled`.
+    """Assign to a triangle the unowned cells whose centres a closed surface encloses, and write the value to `filled`.
+
+    `winding` is the result of `wind` for a part of the grid, which begins at the cell `first`.
     """
     for i in range(winding.shape[0]):
         for j in range(winding.shape[1]):
@@ -192,8 +196,8 @@ def fill(winding, first, triangle, owner, filled, value):
 
 @njit
 def heights(points, triangles, rows, lowest, highest):
-    """Write where the lines along the middle axis, through the cells' centres, first and last cross triangles of these rows:
-    (X, Z), in cells.
+    """Write the first and the last place where lines along the middle axis cross triangles of these rows: (X, Z), in cells. The
+    lines go through the cells' centres.
     """
     for t in rows:
         x0, x1 = span(points, triangles, t, 0, lowest.shape[0])
@@ -207,8 +211,10 @@ def heights(points, triangles, rows, lowest, highest):
 
 @njit
 def seen(pixels, depth, inverse_depth, codes, out):
-    """Write of points (N,) at these pixels (N, 2), NaN for none, how they are seen: codes (3,) are those of what is outside of
-    the picture (H, W), of what is nearer than its pixel shows, and of all else.
+    """Write the visibility of points (N,) at these pixels (N, 2), NaN for none.
+
+    codes (3,) are the codes of points outside the picture (H, W), of points nearer than the surface in their pixel, and of all
+    others.
     """
     height, width = inverse_depth.shape
     for n in range(out.shape[0]):
@@ -221,8 +227,10 @@ def seen(pixels, depth, inverse_depth, codes, out):
 
 @njit
 def starts(owner, table, filled, state, indoors, out):
-    """Write to `out` (N,) the first cells of runs of cells that are equal in all of these flat arrays, of which `owner` are
-    rows of `table` (T, 2), -1 for none; and give how many there are, which may be more than fit.
+    """Write to `out` (N,) the first cell of each run of cells that are equal in all of these flat arrays, and return the number
+    of runs, which may exceed N.
+
+    The entries of `owner` are rows of `table` (T, 2), -1 for none.
     """
     count = 0
     for n in range(owner.shape[0]):
@@ -239,7 +247,7 @@ def starts(owner, table, filled, state, indoors, out):
 
 @njit
 def join(parent, triangles):
-    """Join the corners of each triangle: `parent` (V,) leads from every vertex to the first one of its piece."""
+    """Join the corners of each triangle: `parent` (V,) leads from each vertex to the first vertex of its piece."""
     for t in range(triangles.shape[0]):
         root = triangles[t, 0]
         while parent[root] != root:

@@ -1,1 +1,1 @@
-"""The correspondences between pictures: the place in one picture of each point that a pixel of another shows."""
+"""Correspondences between pictures: for each pixel, the place of its point in another picture."""

@@ -1,7 +1,7 @@
 """Correspondence: positions in another view of the points that one view's pixels show, and their visibility there.
 
 A pixel's point is the place where its ray meets the first surface. It moves with its thing, or with its triangle if the thing
-deforms. The ground is a fixed plane, the sky a direction. All computation is in float64.
+deforms. The ground is a fixed plane, and the sky is a direction. All computation is in float64.
 """
 
 from __future__ import annotations
@@ -28,7 +28,8 @@ Real = TypeVar("Real", np.float32, np.float64)
 
 @dataclass(frozen=True, eq=False)
 class Deformed:
-    """Pixels that show what deforms, by their number in the picture (n,), and their points in either camera's axes (n, 3).
+    """Pixels that show deforming things: their numbers in the picture (n,), and their points in the axes of either camera (n,
+    3).
 
     is_still (n,): whether neither the camera nor the point's triangle moved.
     """
@@ -41,7 +42,9 @@ class Deformed:
 
 @dataclass(frozen=True, eq=False)
 class Match:
-    """The points of one view's pixels in another view: `visibility` is what `view` sees. Arrays are of its picture's size."""
+    """The points of one view's pixels in another view: `visibility` is that of `view`. Arrays have the size of the picture of
+    `view`.
+    """
 
     view: View
     visibility: Visibility
@@ -49,7 +52,8 @@ class Match:
 
     @property
     def xy(self) -> Float:
-        """Pixels in the other view, (H, W, 2), NaN where there are none; a pixel's own centre where nothing moved."""
+        """Positions in the other view, (H, W, 2), in pixels; NaN if there is none, and the pixel's own centre if nothing moved.
+        """
         return self.placed.xy
 
     @cached_property
@@ -70,7 +74,7 @@ class Match:
     def xyz(self) -> Float:
         """The places of the points at the other instant, in the other camera's axes, (H, W, 3) metres.
 
-        They are NaN for points that are nowhere then, and (NaN, NaN, inf) for the sky.
+        They are NaN for points that do not exist then, and (NaN, NaN, inf) for the sky.
         """
         out = self._moved(self._maps.turn, np.float64)
         out[(self._inverse == 0.0) & (self.placed.near == 0.0), 2] = np.inf
@@ -80,9 +84,9 @@ class Match:
 
     @cached_property
     def scene_flow(self) -> NDArray[np.float32]:
-        """By how much the points move, each in its own instant's camera axes, (H, W, 3) metres; NaN of the sky, too.
+        """The motion of each point between the camera axes of its two instants, (H, W, 3) metres; NaN for the sky, too.
 
-        A difference of motions, not of points: exact however far from the camera, or from the origin.
+        It is computed from differences of motions, not of points, so it is exact at any distance from the camera or the origin.
         """
         out = self._moved(self._maps.turn - np.eye(3), np.float32)
         if self._deformed is not None:
@@ -91,13 +95,15 @@ class Match:
 
     @cached_property
     def inverse_depth(self) -> Float:
-        """1/z in the other camera's axes, (H, W): 0 of the sky and of what has no pixel, NaN of what is nowhere."""
+        """1/z in the other camera's axes, (H, W): 0 for the sky and for points without a pixel, NaN for points that do not
+        exist.
+        """
         rays, near = self.placed.rays, self.placed.near
         return near if rays is None else np.divide(near, rays[..., 2], out=near.copy(), where=near > 0.0)
 
     @cached_property
     def state(self) -> NDArray[np.uint8]:
-        """The points' states in the other view, (H, W), see `surface_points.raster`; `states` computes several at once."""
+        """The points' states in the other view, (H, W); see `surface_points.raster`. Its `states` computes several at once."""
         return states([self.placed])[0]
 
     @cached_property
@@ -120,7 +126,7 @@ class Match:
 
     @property
     def _pixels(self) -> tuple[NDArray[np.int32], NDArray[np.int32], Float, Float, NDArray[np.int32]]:
-        """The arguments on pixels and things that all kernels take."""
+        """The arguments for pixels and things that all kernels take."""
         inverse, rays = self._inverse.reshape(-1), self.view.rays.reshape(-1)
         return self.visibility.triangle, self.view.owners, inverse, rays, self._maps.kinds
 
@@ -153,7 +159,7 @@ class Match:
 
     def _shows(self, kind: int) -> NDArray[np.bool_]:
         """Return a mask of the pixels that show a thing of this kind, (H, W)."""
-        owners = np.append(self.view.owners, len(self._maps.kinds) - 1)  # the last is the sky's
+        owners = np.append(self.view.owners, len(self._maps.kinds) - 1)  # the last row is for the sky
         return (self._maps.kinds == kind)[owners][self.visibility.triangle]
 
     @cached_property
@@ -186,7 +192,7 @@ class Match:
 
 
 def _own(seen: NDArray[np.int32], view: View, other: View) -> NDArray[np.int32]:
-    """The other view's numbers of the triangles that are seen in a view, -1 where none is."""
+    """The other view's numbers of the triangles visible in a view, -1 if there is none."""
     from viewsphere.truth.correspondences import kernels_correspond as kernels
 
     shift = shifts(view, other)

@@ -1,8 +1,8 @@
-"""The places, in another view, of the points that pixels show: rigid things need one matrix each, and read no vertex.
+"""The places, in another view, of the points that pixels show. Rigid things need one matrix each, and no vertex is read.
 
-A pixel's point is p / i in front of its camera: p the pixel (x, y, 1) or its ray, i = 1/s. So a rigid motion, and a projection
-after it, is q = M (p, i) with one matrix (3, 4) for all points of a thing. i = 0 is a direction: so the sky's formula is the
-same.
+A pixel's point is p / i in front of its camera: p is the pixel (x, y, 1) or its ray, and i = 1/s. So a rigid motion followed by
+a projection is q = M (p, i), with one matrix (3, 4) for all points of a thing. If i = 0, the point is a direction, so the same
+formula holds for the sky.
 
 All arrays of pixels except `seen` (H, W) are flat, with the components of a pixel beside one another. Compilers vectorise a
 loop over pixels only if the distance between its numbers is constant.
@@ -28,7 +28,7 @@ def _thing(seen, owners, y, x, sky):
 
 @inner
 def _run(seen, owners, y, x, sky):
-    """The thing that a pixel shows, and the first column after it that shows another one."""
+    """The thing that a pixel shows, and the first column after it that shows another thing."""
     t, stop = seen[y, np.uintp(x)], x + 1
     k = _thing(seen, owners, y, np.uintp(x), sky)
     while stop < seen.shape[1]:
@@ -41,10 +41,10 @@ def _run(seen, owners, y, x, sky):
 
 @njit
 def on_pinhole(seen, owners, inverse, rays, kinds, maps, xy, near):
-    """Pixels xy (H W 2,) and near (H W,), 1/z, of the points in a pinhole's view; `kinds` and `maps` (n, 3, 4) of the things,
-    then of the ground and of the sky.
+    """Positions xy (H W 2,) in pixels and near (H W,), 1/z, of the points in a pinhole's view. `kinds` and `maps` (n, 3, 4) are
+    for the things, then for the ground and for the sky.
 
-    Behind the camera xy is NaN and near 0; both are NaN where there is no point.
+    Behind the camera, xy is NaN and near is 0; if there is no point, both are NaN.
     """
     height, width = seen.shape
     sky, table = np.int32(kinds.shape[0] - 1), rays.shape[0] > 0
@@ -115,7 +115,7 @@ def _turned(m, px, py, pz):
 def as_rays(seen, owners, inverse, rays, kinds, maps, unit, out, near):
     """Rays (H W 3,) towards the points in a distorted lens' view, and near (H W,), 1/s: the point is ray / near.
 
-    Rays are of length 1 with `unit`, else z = 1, NaN behind the camera; both are NaN where there is no point.
+    Rays have length 1 if `unit` is set, otherwise z = 1 (NaN behind the camera). Both results are NaN if there is no point.
     """
     height, width = seen.shape
     sky, table = np.int32(kinds.shape[0] - 1), rays.shape[0] > 0
@@ -129,7 +129,7 @@ def as_rays(seen, owners, inverse, rays, kinds, maps, unit, out, near):
             px, py, pz = (rays[i], rays[i + B], rays[i + C]) if table else (x + 0.5, y + 0.5, 1.0)
             u, v, w = _moved(maps[k], px, py, pz, s)
             if kinds[k] == STILL:
-                u, v, w = px, py, pz  # both lenses are one: the ray is the pixel's own
+                u, v, w = px, py, pz  # both lenses are equal: the ray is the pixel's own
             length = math.sqrt(u * u + v * v + w * w) if unit else w
             r = 1.0 / length if length > 0.0 else np.nan
             if kinds[k] == STILL:
@@ -140,7 +140,7 @@ def as_rays(seen, owners, inverse, rays, kinds, maps, unit, out, near):
 
 @njit
 def in_axes(seen, owners, inverse, rays, kinds, maps, out):
-    """M (p, i) / i (H W 3,) of each pixel, NaN where there is no point, and of the sky."""
+    """M (p, i) / i (H W 3,) of each pixel, NaN for the sky and if there is no point."""
     height, width = seen.shape
     sky, table = np.int32(kinds.shape[0] - 1), rays.shape[0] > 0
     for y in range(height):
@@ -186,7 +186,9 @@ def _places_of_rays(m, rays, inverse, first, stop, out):
 
 @njit
 def flow_on_pinhole(seen, owners, inverse, kinds, maps, out):
-    """From pixels of a pinhole to their points in another one, (H W 2,) float32: `on_pinhole` less the pixels' centres."""
+    """The flow from pixels of a pinhole to their points in another one, (H W 2,) float32: `on_pinhole` minus the pixels'
+    centres.
+    """
     height, width = seen.shape
     sky = np.int32(kinds.shape[0] - 1)
     for y in range(height):
@@ -217,7 +219,7 @@ def _row_of_flow(m, inverse, y, row, first, stop, out):
 def from_centers(xy, width, out):
     """Write the offsets of positions xy (H W 2,) from the centres of their pixels into out (H W 2,) float32.
 
-    width: of the picture.
+    `width` is the width of the picture.
     """
     for row in range(0, xy.shape[0] // 2, width):
         py = row // width + 0.5
@@ -228,7 +230,7 @@ def from_centers(xy, width, out):
 
 @njit
 def own_triangles(seen, owners, shift, own):
-    """The other view's number of each pixel's triangle: `shift` further on by thing; -1 where none is."""
+    """The other view's number of each pixel's triangle, which differs by `shift` for each thing; -1 if there is none."""
     height, width = seen.shape
     for y in range(height):
         for x in range(width):

@@ -1,4 +1,5 @@
-"""The rigid motions of things between two views: one matrix a thing, which takes pixels and 1/s here to pixels there."""
+"""The rigid motions of things between two views: one matrix per thing maps pixels and 1/s of one view to pixels of the other.
+"""
 
 from __future__ import annotations
 
@@ -19,8 +20,8 @@ KINDS = {"moved": RIGID, "deformed": OTHER, "gone": GONE}
 class Maps:
     """The motions of things, then of the ground and the sky, from one view to another.
 
-    `kinds` (n + 2,) int32 as in `kernels_correspond`; camera axes there are turn x + shift, x those here: (n + 2, 3, 3) and
-    (n + 2, 3), the sky's without a shift.
+    `kinds` (n + 2,) int32 as in `kernels_correspond`; a point x in this camera's axes is turn x + shift in the other's, with
+    turns (n + 2, 3, 3) and shifts (n + 2, 3). The sky has no shift.
     """
 
     kinds: NDArray[np.int32]
@@ -32,18 +33,18 @@ class Maps:
         return np.concatenate((linear, self.shift[..., None]), axis=-1)
 
     def projected(self, here: View, there: View) -> Float:
-        """From rays and 1/s here to homogeneous pixels of a pinhole there, (n + 2, 3, 4)."""
+        """The matrices (n + 2, 3, 4) from rays and 1/s in one view to homogeneous pixels of a pinhole in the other."""
         linear = product(self.turn, here.camera_from_ray)
         projected = product(there.camera.K, self.matrices(linear))
         if here.camera.intrinsics == there.camera.intrinsics:
-            projected[(self.turn == np.eye(3)).all(axis=(1, 2)), :, :3] = np.eye(3)  # K K^-1 but for rounding
+            projected[(self.turn == np.eye(3)).all(axis=(1, 2)), :, :3] = np.eye(3)  # K K^-1 without its rounding error
         return projected
 
 
 def maps_between(here: View, there: View) -> Maps:
     """Return the motions of things from one view to another.
 
-    Shifts are composed of differences of near places, not of far ones: exact however far away the origin is.
+    Shifts are composed of differences between near places, not far ones, so they are exact at any distance from the origin.
     """
     kinds, before, after = _poses(here, there)
     world_turn = np.tile(np.eye(3), (len(before), 1, 1))
@@ -65,7 +66,7 @@ def maps_between(here: View, there: View) -> Maps:
 
 
 def _seen_turn(here: View, there: View, world_turn: Float, moving: NDArray[np.intp]) -> Float:
-    """The turns as cameras see them: exactly none of what did not turn, seen by cameras that are turned alike."""
+    """The turns as cameras see them: exactly the identity if neither the thing nor the camera's orientation changed."""
     turn = product(product(there.camera.R, world_turn), here.world_from_camera)
     if np.array_equal(here.camera.R, there.camera.R):
         turn[(world_turn == np.eye(3)).all(axis=(1, 2))] = np.eye(3)
@@ -73,7 +74,7 @@ def _seen_turn(here: View, there: View, world_turn: Float, moving: NDArray[np.in
 
 
 def _poses(here: View, there: View) -> tuple[NDArray[np.int32], Float, Float]:
-    """Kinds, and world from object before and after, of things, ground and sky; both the identity of what does not move."""
+    """Kinds, and world from object before and after, of things, ground and sky; both poses are the identity for fixed ones."""
     count = len(here.things) + 2
     kinds = np.full(count, RIGID, np.int32)
     before = np.tile(np.eye(4), (count, 1, 1))

@@ -1,4 +1,4 @@
-"""The places and the angles at which a LiDAR's rays meet surfaces."""
+"""The places and angles at which a LiDAR's rays meet surfaces."""
 
 from __future__ import annotations
 
@@ -9,8 +9,9 @@ from viewsphere.kernels.jit import njit
 
 @njit
 def incidence(rays, normals, chosen, rotation, angle, cosine):
-    """Fill (N,) each with the angle, 0 to pi/2, between rays (N, 3) and the `chosen` normals (N,), and its cosine; rotation
-    (3, 3) takes normals, of any length, to the rays' axes.
+    """Fill `angle` (N,) and `cosine` (N,) with the angle, 0 to pi/2, between rays (N, 3) and the `chosen` normals (N,).
+
+    `rotation` (3, 3) maps normals, of any length, to the rays' axes.
     """
     for i in range(angle.shape[0]):
         dx, dy, dz = rays[i, 0], rays[i, 1], rays[i, 2]
@@ -27,7 +28,9 @@ def incidence(rays, normals, chosen, rotation, angle, cosine):
 
 @njit
 def weights(points, corners, out):
-    """Fill (N, 3) with the weights, none negative, of the corners (N, 3, 3) of triangles at points (N, 3) of their planes."""
+    """Fill (N, 3) with the weights, none of them negative, of the corners (N, 3, 3) of triangles at points (N, 3) of their
+    planes.
+    """
     for i in range(out.shape[0]):
         a, b, c = corners[i, 0], corners[i, 1], corners[i, 2]
         bx, by, bz = b[0] - a[0], b[1] - a[1], b[2] - a[2]

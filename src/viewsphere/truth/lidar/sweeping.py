@@ -1,4 +1,4 @@
-"""The hits of a LiDAR's rays, all at once, or column after column while things and sensor move."""
+"""The hits of a LiDAR's rays, measured all at once, or column by column while things and sensor move."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ from viewsphere.truth.raster.visibility import Visibility, homogeneous, lens_ray
 Float = NDArray[np.float64]
 
 SECTORS = 36
-"""Parts of a sweep: all triangles are drawn where they are in the middle of each."""
+"""Number of parts of a sweep; in each, all triangles are drawn at their places in the middle of that part."""
 
 GLANCE = np.cos(np.radians(80.0))
-"""Cosine of the incidence beyond which a point is not moved along the plane of a triangle that the ray misses."""
+"""Cosine of the incidence angle beyond which a point is not moved along the plane of a triangle that the ray misses."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,7 +104,7 @@ def _moved(geometry: Geometry, camera: Camera, turning: Turning, column: int) ->
 
 
 def _own_moment(geometry: Geometry, camera: Camera, turning: Turning, found: tuple[Any, Any, Any, Float]) -> Hits:
-    """Hits (ring, column, triangle, distance) of a sector's middle, taken to the moments of their columns."""
+    """Hits (ring, column, triangle, distance) at the middle of a sector, moved to the moments of their columns."""
     ring, column, triangle, distance = found
     rays = _rays(camera)[ring, column]
     corners = geometry.corners(triangle)
@@ -152,8 +152,8 @@ def _rays(camera: Camera) -> Float:
 
 
 def _incidence(rays: Float, normals: NDArray[np.floating], chosen: NDArray[np.int32], rotation: Float) -> tuple[Float, Float]:
-    """Angles (N,) between rays (N, 3) and the chosen (N,) of some normals, which a rotation takes to the rays' axes, and their
-    cosines (N,).
+    """The angles (N,) between rays (N, 3) and the chosen (N,) normals, and their cosines (N,). The rotation maps normals to the
+    rays' axes.
     """
     from viewsphere.truth.lidar import kernels_lidar as kernels
 

@@ -1,1 +1,1 @@
-"""The triangle that every pixel shows, and its distance."""
+"""The triangle that each pixel shows, and its distance."""

@@ -1,4 +1,4 @@
-"""Cut-outs: where a triangle with a see-through material is surface."""
+"""Cut-outs: the places where a triangle with a see-through material is surface."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from viewsphere.assets.mesh import WRAPS, Material, Mesh, Texture, Wrap
 
 SURFACE, NEVER = -1, -2
 ENDLESS = (-3, -4)
-"""Half of an endless plane: of the triangle's edges only the one opposite corner 1 (or 2) counts, and all of it is surface."""
-SEEN = 1 / 512  # least alpha of a texel that is not clear
+"""Half of an endless plane: only the edge opposite corner 1 (or 2) counts, and all of it is surface."""
+SEEN = 1 / 512  # smallest alpha of a texel that is not clear
 _BORDERS: dict[Wrap, Literal["wrap", "symmetric", "edge"]] = {"repeat": "wrap", "mirror": "symmetric", "clamp": "edge"}
 
 
@@ -22,11 +22,11 @@ _BORDERS: dict[Wrap, Literal["wrap", "symmetric", "edge"]] = {"repeat": "wrap", 
 class AlphaMasks:
     """The cut-out materials of a stage and the triangles that use them, packed for the kernels.
 
-    A point is surface where `texel / 255 * factor * a >= threshold`: the nearest texel at its (u, v) and the interpolated
-    vertex alpha a. texels (N,) uint8: the alpha of all textures, row by row; layout (M, 5) int64 per material: offset into
-    `texels`, width, height, wrap of u, wrap of v (indices of WRAPS); levels (M, 2) float64: factor, threshold; material
-    (C,) int32 per cut-out triangle: a row of `layout`; corners (C, 3, 3) float64: (u, v, a) of its corners, texture
-    transform applied.
+    A point is surface if `texel / 255 * factor * a >= threshold`, with the nearest texel at its (u, v) and the interpolated
+    vertex alpha a. texels (N,) uint8: the alpha of all textures, row by row. layout (M, 5) int64 per material: offset into
+    `texels`, width, height, wrap of u, wrap of v (indices of WRAPS). levels (M, 2) float64: factor, threshold. material (C,)
+    int32 per cut-out triangle: a row of `layout`. corners (C, 3, 3) float64: (u, v, a) of its corners, after the texture
+    transform.
     """
 
     texels: NDArray[np.uint8]
@@ -37,7 +37,7 @@ class AlphaMasks:
 
     @property
     def arrays(self) -> tuple[NDArray[Any], ...]:
-        """(texels, layout, levels, material, corners), as the kernels take them."""
+        """(texels, layout, levels, material, corners), in the form that the kernels take."""
         return self.texels, self.layout, self.levels, self.material, self.corners
 
 
@@ -53,7 +53,7 @@ NO_CUTOUTS = AlphaMasks(
 def mesh_cutouts(mesh: Mesh, label_alpha: float | None) -> tuple[AlphaMasks, NDArray[np.int32]]:
     """The mesh's cut-outs and, for each triangle (T,), SURFACE, NEVER or its row of `corners`.
 
-    Without `label_alpha`, a BLEND material is surface wherever it has a colour, and one texel beyond, which filtering colours.
+    Without `label_alpha`, a BLEND material is surface wherever it has a colour, plus one texel beyond, which filtering colours.
     """
     rows = np.full(len(mesh.triangles), SURFACE, np.int32)
     alpha_masks = NO_CUTOUTS
@@ -76,14 +76,15 @@ def mesh_cutouts(mesh: Mesh, label_alpha: float | None) -> tuple[AlphaMasks, NDA
 
 
 def alpha_masks_of(meshes: Sequence[Mesh], label_alpha: float | None) -> list[tuple[AlphaMasks, NDArray[np.int32]]]:
-    """`mesh_cutouts` of each mesh; a mesh that several things show is looked at once."""
+    """`mesh_cutouts` of each mesh; a mesh shared by several things is processed once."""
     known = {id(mesh): mesh_cutouts(mesh, label_alpha) for mesh in {id(mesh): mesh for mesh in meshes}.values()}
     return [known[id(mesh)] for mesh in meshes]
 
 
 def stack_cutouts(parts: Sequence[tuple[AlphaMasks, NDArray[np.int32]]]) -> tuple[AlphaMasks, NDArray[np.int32]]:
-    """The cut-outs of all meshes as one, and for each triangle (T,) SURFACE, NEVER or its row of `corners` there. Cut-outs that
-    occur again, as those of a mesh that several things show, are there once.
+    """The cut-outs of all meshes combined, and for each triangle (T,) SURFACE, NEVER or its row of the combined `corners`.
+
+    Repeated cut-outs, such as those of a mesh that several things share, are stored once.
     """
     firsts, distinct, count = dict[int, int](), list[AlphaMasks](), 0
     rows = [np.zeros(0, np.int32)]
@@ -98,7 +99,7 @@ def stack_cutouts(parts: Sequence[tuple[AlphaMasks, NDArray[np.int32]]]) -> tupl
 
 
 def _joined(parts: Sequence[AlphaMasks]) -> AlphaMasks:
-    """One after another; all offsets and numbers are those of the whole."""
+    """The cut-outs of all parts, one after another; offsets and numbers count in the whole."""
     texels = np.cumsum([0, *(len(part.texels) for part in parts)]).tolist()
     layouts = np.cumsum([0, *(len(part.layout) for part in parts)]).tolist()
     placed = [part.layout + np.array([first, 0, 0, 0, 0]) for part, first in zip(parts, texels, strict=False)]
@@ -136,7 +137,7 @@ def _material_cutouts(
 
 
 def _spread(texels: NDArray[np.uint8], texture: Texture) -> NDArray[np.uint8]:
-    """The greatest alpha of each texel and its eight neighbours, (H, W), wrapped as the texture is."""
+    """The greatest alpha of each texel and its eight neighbours, (H, W), with the texture's wrapping."""
     tall = np.pad(texels, ((1, 1), (0, 0)), _BORDERS[texture.wrap_t])
     most = np.maximum(np.maximum(tall[:-2], tall[1:-1]), tall[2:])
     wide = np.pad(most, ((0, 0), (1, 1)), _BORDERS[texture.wrap_s])
@@ -144,6 +145,8 @@ def _spread(texels: NDArray[np.uint8], texture: Texture) -> NDArray[np.uint8]:
 
 
 def _transformed(matrix: NDArray[np.float64], uv: NDArray[np.float64]) -> NDArray[np.float64]:
-    """`uv` (..., 2) under the matrix (2, 3). Written out, because BLAS rounds differently from processor to processor."""
+    """`uv` (..., 2) transformed by the matrix (2, 3). The products are written out, because BLAS rounds differently from
+    processor to processor.
+    """
     u, v = uv[..., 0], uv[..., 1]
     return np.stack([a * u + b * v + c for a, b, c in matrix], axis=-1)

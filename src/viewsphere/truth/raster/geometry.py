@@ -1,4 +1,4 @@
-"""Geometry: the world-space triangles of a stage, the one source of every label."""
+"""Geometry: the world-space triangles of a stage, which all labels are computed from."""
 
 from __future__ import annotations
 
@@ -19,17 +19,17 @@ from viewsphere.truth.raster.sparse import Spare
 from viewsphere.truth.raster.triangle_labels import TriangleLabels, ground_classes, scenery_classes
 
 BACKGROUND = 0
-"""Object, part and category id of scenery and ground: they have depth and normals but are background to every label."""
+"""Object, part and category id of scenery and ground, which have depth and normals but are background in every label."""
 
 UP = np.array([0, 0, 1], np.float32)
 """The ground's normal."""
 
 GROUND_REACH = 1000.0
-"""Scene sizes from the middle to the ground's corners: as far as a renderer without endless planes has to draw it."""
+"""Distance from the middle to the ground's corners, in scene sizes: as far as renderers without endless planes must draw it."""
 
 OF_VERTICES = ("coordinates", "is_used")
 STACKED = (*OF_VERTICES, "triangle_object", "poses", "bounds", "ground")
-"""Arrays of a geometry that are those of its parts, one after another."""
+"""Arrays of a geometry that are concatenated from its parts."""
 
 Corner = NDArray[np.float64]
 
@@ -38,23 +38,23 @@ Corner = NDArray[np.float64]
 class Geometry:
     """Triangles in the world: objects in id order, then scenery, the ground (if any) last.
 
-    Where things are is held once a thing, not for each vertex: instants and instances share all else. poses (N, 4, 4) float64:
-    world from each thing; meshes: theirs; coordinates (V, 3) float32: each vertex in its thing's axes (zero for the ground);
-    ground (4, 3) float64: its corners in the world, (0, 3) without one.
+    Poses are stored per thing, not per vertex, so instants and instances share everything else. poses (N, 4, 4) float64: world
+    from each thing. meshes: one for each thing. coordinates (V, 3) float32: each vertex in its thing's axes (zero for the
+    ground). ground (4, 3) float64: its corners in the world, (0, 3) without a ground.
 
-    triangles (T, 3) int32; triangle_object (T,) int32: 0 for scenery and ground; single_sided (n,) int32: the triangles that a
-    camera sees from their fronts alone, see `seen_from`; labels: further numbers of triangles, of the objects' alone, which
-    come first, all others have 0, but for classes of things and stuff; triangle_cutout (T,) int32: -1 all surface, -2 never
-    seen, -3 and -4 `alpha_masks.ENDLESS`, else a row of `AlphaMasks.corners`.
+    triangles (T, 3) int32. triangle_object (T,) int32: 0 for scenery and ground. single_sided (n,) int32: the triangles that a
+    camera sees only from the front, see `seen_from`. labels: further numbers of triangles; except for classes of things and
+    stuff, they cover only the objects, which come first, and are 0 for all others. triangle_cutout (T,) int32: -1 all surface,
+    -2 never seen, -3 and -4 `alpha_masks.ENDLESS`, otherwise a row of `AlphaMasks.corners`.
 
-    is_used (V,): whether a vertex is a triangle's corner; bounds (N, 2, 3) float64: of each thing, world metres, the lowest and
-    the highest of its used vertices, infinite where it has none.
+    is_used (V,): whether a vertex is a corner of a triangle. bounds (N, 2, 3) float64: the lowest and the highest coordinates
+    of each thing's used vertices, in world metres, infinite if it has none.
 
-    The ground is the whole plane z = ground_z, its two triangles are halves of it. They stand for no place: under what moves
-    their corners move along, so a point of the ground is kept as its place in the world.
+    The ground is the whole plane z = ground_z, and its two triangles are halves of that plane. The triangles do not mark a
+    fixed place, because their corners move with the things above. So a point of the ground is stored as its place in the world.
 
-    Thing i owns vertices [vertex_start[i], vertex_start[i + 1]) and triangles [triangle_start[i], triangle_start[i + 1]);
-    both have one entry more than there are things. The first `object_count` of them are the objects 1, 2, ...
+    Thing i owns vertices [vertex_start[i], vertex_start[i + 1]) and triangles [triangle_start[i], triangle_start[i + 1]); both
+    have one entry more than there are things. The first `object_count` of them are the objects 1, 2, ...
     """
 
     poses: Corner
@@ -78,7 +78,7 @@ class Geometry:
 
     @property
     def triangle_part(self) -> NDArray[np.int32]:
-        """Parts of the objects' models; this and the next are made when they are read first."""
+        """Parts of the objects' models; this array and the next are computed when they are first read."""
         return self.labels.part
 
     @property
@@ -103,37 +103,39 @@ class Geometry:
 
     @property
     def vertices(self) -> NDArray[np.float64]:
-        """World metres (V, 3), made anew: of a part of them use `places` or `corners`."""
+        """World metres (V, 3), computed on each call; for a part of the vertices, use `places` or `corners`."""
         return np.concatenate([*(self.places(i) for i in range(len(self.poses))), self.ground])
 
     @property
     def normals(self) -> NDArray[np.float32]:
-        """Of the vertices (V, 3), world, unit. As the next two it is written to where another instant's are asked for."""
+        """World unit normals of the vertices (V, 3). This array and the next two are overwritten when those of another instant
+        are requested.
+        """
         return self.facing.of_vertices(self)[: len(self.coordinates)]
 
     @property
     def triangle_normals(self) -> NDArray[np.float32]:
-        """Of the triangles (T, 3), world, unit, by winding; zero for a degenerate triangle."""
+        """World unit normals of the triangles (T, 3), by winding; zero for a degenerate triangle."""
         return self.facing.of_triangles(self)[0][: len(self.triangle_object)]
 
     def triangle_normals_of(self, things: Iterable[int]) -> NDArray[np.float32]:
-        """`triangle_normals`, of which only those of these things and of the ground are sure to be as they are now."""
+        """`triangle_normals`, up to date only for these things and the ground."""
         return self.facing.of_triangles(self, things)[0][: len(self.triangle_object)]
 
     @property
     def triangle_side(self) -> NDArray[np.int8]:
-        """Of each triangle (T,): 1 where the mean of the vertex normals agrees with the winding, -1 where it opposes it, 2 or
-        -2 likewise where all three equal the triangle's own.
+        """The side of each triangle (T,): 1 if the mean of its vertex normals agrees with the winding, -1 if it opposes it. The
+        side is 2 or -2 if, in addition, all three vertex normals equal the triangle's own.
         """
         return self.facing.of_triangles(self)[1][: len(self.triangle_object)]
 
     @property
     def triangle_tops(self) -> NDArray[np.float64]:
-        """World z (T,) of each triangle's highest corner, metres; written to as `normals` is."""
+        """World z (T,) of each triangle's highest corner, in metres; overwritten like `normals`."""
         return self.facing.tops(self)[: len(self.triangle_object)]
 
     def places(self, i: int) -> NDArray[np.float64]:
-        """World vertices of thing i (n, 3); the ground's come after those of the last thing."""
+        """World vertices of thing i (n, 3); the ground's index follows that of the last thing."""
         from viewsphere.truth.raster import kernels_place as kernels
 
         if i == len(self.poses):
@@ -154,11 +156,13 @@ class Geometry:
 
     @property
     def has_scenery(self) -> bool:
-        """Return whether anything but objects and the ground is there."""
+        """Return whether there is anything besides objects and the ground."""
         return self.object_count < len(self.vertex_start) - 1
 
     def extent(self, things: int | None = None) -> tuple[Corner, Corner]:
-        """Lowest and highest corner (3,) of the first so many things, of all without a number; the origin if they have none."""
+        """The lowest and the highest corner (3,) of the first `things` things, or of all if it is None; the origin if there are
+        none.
+        """
         return _extent(self.bounds[:things])
 
 
@@ -166,7 +170,7 @@ class Geometry:
 class Facing:
     """The world normals of a scene's vertices and triangles.
 
-    The arrays are overwritten when another instant asks for them, so that all instants share one of each.
+    The arrays are overwritten when the normals of another instant are requested, so all instants share one of each.
     """
 
     _vertices: NDArray[np.float32] | None = None
@@ -175,8 +179,8 @@ class Facing:
     _shown: dict[str, _Shown] = field(default_factory=dict[str, "_Shown"])
 
     def of_vertices(self, geometry: Geometry) -> NDArray[np.float32]:
-        """Their normals."""
-        if self._vertices is None or len(self._vertices) < len(geometry.coordinates):  # asked for before without the ground
+        """The world normals of the vertices."""
+        if self._vertices is None or len(self._vertices) < len(geometry.coordinates):  # requested before without the ground
             self._vertices = np.tile(UP, (len(geometry.coordinates), 1))
             self._shown.pop("vertices", None)
         for i in self._elsewhere("vertices", geometry):
@@ -187,7 +191,7 @@ class Facing:
     def of_triangles(
         self, geometry: Geometry, things: Iterable[int] | None = None
     ) -> tuple[NDArray[np.float32], NDArray[np.int8]]:
-        """Their normals and sides; only those of these things are sure to be written, where any are given."""
+        """The world normals and the sides of the triangles; if things are given, only theirs are sure to be up to date."""
         from viewsphere.truth.raster import kernels_place as kernels
 
         if self._triangles is None or len(self._triangles[1]) < len(geometry.triangles):
@@ -220,7 +224,7 @@ class Facing:
         return self._tops
 
     def _elsewhere(self, name: str, geometry: Geometry, things: Iterable[int] | None = None) -> list[int]:
-        """Return the indices of the things that have moved, or deformed, since these arrays were written.
+        """Return the indices of the things that have moved or deformed since these arrays were written.
 
         things: the things to compare; all by default.
         """
@@ -241,7 +245,7 @@ class Facing:
 
 @dataclass(eq=False)
 class _Shown:
-    """The poses (N, 4, 4) and meshes that were written of each thing; all_of: the poses of a geometry, if they are these."""
+    """The poses (N, 4, 4) and meshes last written for each thing; all_of: the geometry's poses, if they are the same."""
 
     poses: Corner
     meshes: list[Mesh]
@@ -256,13 +260,13 @@ def _turn(geometry: Geometry, i: int, turned: NDArray[np.float32]) -> None:
 
 
 def placed_meshes(things: Sequence[Thing], load: Load) -> list[Mesh]:
-    """The model of each thing as it rests; each is loaded once."""
+    """The model of each thing at rest; each model is loaded once."""
     loaded = {spec: load(spec) for spec in dict.fromkeys(p.model for p in things)}
     return [loaded[p.model] for p in things]
 
 
 def present(things: Sequence[Thing], meshes: Sequence[Mesh]) -> list[Mesh]:
-    """The meshes of things that stand still; of those that are not there one without triangles, but with all materials."""
+    """The meshes of still things. An absent thing has a mesh without triangles, but with all materials."""
     return [mesh if thing.is_there else mesh.emptied() for thing, mesh in zip(things, meshes, strict=True)]
 
 
@@ -274,14 +278,14 @@ def build_geometry(
     floor: Floor | None = None,
     keeps_scenery: bool = True,
 ) -> Geometry:
-    """Place the meshes in the world and, if asked, lay the ground at their lowest point (z = 0 if there are none), or where
-    `floor` says: something that jumps leaves it.
+    """Place the meshes in the world and, if requested, lay the ground at their lowest point (z = 0 if there are none), or at
+    the height of `floor`: a jumping thing leaves it.
 
     `meshes[i]` is the normalised model of `things[i]`; ids are 1..N in order, then 0 for scenery. A BLEND material is surface
-    where alpha >= label_alpha, a MASK material where alpha >= its cutoff; transmission always counts as surface. Fully
-    transparent triangles (no texel is surface) are kept but never seen. Raises ValueError for other ids.
+    if alpha >= label_alpha, a MASK material if alpha >= its cutoff; transmission always counts as surface. Fully transparent
+    triangles (no texel is surface) are kept but never seen. Raises ValueError for other ids.
 
-    The last scenery is kept, unless it is of no use to others: where only objects change, it is not placed again.
+    The latest scenery is cached, unless no other geometry could use it; so it is not placed again while only objects change.
     """
     count = sum(p.id > 0 for p in things)
     if [p.id for p in things] != [*range(1, count + 1), *[BACKGROUND] * (len(meshes) - count)]:
@@ -294,8 +298,10 @@ def build_geometry(
 
 
 def moved(geometry: Geometry, where: Mapping[int, tuple[Thing, Mesh]]) -> Geometry:
-    """The same with these things elsewhere, or deformed: by their numbers, as they are, and their meshes, which have the same
-    triangles. Coordinates of what is deformed are written in place.
+    """The geometry with some things moved or deformed.
+
+    The things are given by their numbers, with their new state and their meshes, which have the same triangles. Coordinates of
+    deformed things are overwritten in place.
     """
     poses, bounds, meshes = geometry.poses.copy(), geometry.bounds.copy(), list(geometry.meshes)
     for i, (thing, mesh) in where.items():
@@ -310,7 +316,7 @@ def moved(geometry: Geometry, where: Mapping[int, tuple[Thing, Mesh]]) -> Geomet
 
 
 def lay_ground(geometry: Geometry, floor: Floor | None) -> Geometry:
-    """The same with its ground, if any, where `build_geometry` lays it."""
+    """The geometry with its ground, if any, at the height where `build_geometry` lays it."""
     if geometry.ground_z is None:
         return replace(geometry)
     corners = _ground_corners(geometry.bounds, floor)
@@ -318,7 +324,7 @@ def lay_ground(geometry: Geometry, floor: Floor | None) -> Geometry:
 
 
 def without_ground(geometry: Geometry) -> Geometry:
-    """The same, but there is no ground."""
+    """The geometry without its ground."""
     if geometry.ground_z is None:
         return geometry
     vertices, triangles = geometry.vertex_start[-1], geometry.triangle_start[-1]
@@ -329,17 +335,17 @@ def without_ground(geometry: Geometry) -> Geometry:
 
 
 def seen_from(geometry: Geometry, q: NDArray[np.float64], base: int = 0) -> Geometry:
-    """The same, but the single-sided triangles that turn their backs to the camera are never seen, and no others are looked at
-    again; q: vertices from `base` on as `truth.raster.visibility.homogeneous` gives them for the camera.
+    """The geometry without the single-sided triangles that face away from the camera. Only those triangles are tested again. q:
+    vertices from `base` on, as `truth.raster.visibility.homogeneous` gives them for the camera.
 
-    By the sign that the rasteriser computes, so nothing changes where no triangle is single-sided.
+    The test uses the sign that the rasteriser computes, so nothing changes if no triangle is single-sided.
     """
     corners = geometry.triangles[geometry.single_sided] - base
     chosen = ((corners >= 0) & (corners < len(q))).all(axis=1)
     if not chosen.any():
         return geometry
     a, b, c = (q[corners[chosen, i], :3] for i in range(3))
-    with np.errstate(invalid="ignore", over="ignore"):  # of things outside of the picture, which are left out of q
+    with np.errstate(invalid="ignore", over="ignore"):  # things outside the picture, which are left out of q
         is_turned = (np.cross(b - a, c - a) * a).sum(axis=1) > 0
     cutout = geometry.triangle_cutout.copy()
     cutout[geometry.single_sided[chosen][is_turned]] = NEVER
@@ -347,7 +353,7 @@ def seen_from(geometry: Geometry, q: NDArray[np.float64], base: int = 0) -> Geom
 
 
 def with_both_sides(geometry: Geometry) -> Geometry:
-    """The same, but all triangles are seen from both sides, as by rays that are not a camera's."""
+    """The geometry with all triangles visible from both sides, as for rays that do not come from a camera."""
     return replace(geometry, single_sided=geometry.single_sided[:0]) if len(geometry.single_sided) else geometry
 
 
@@ -396,7 +402,7 @@ _scenery = lru_cache(maxsize=1)(_placed)
 
 
 def _stacked(parts: Sequence[Geometry]) -> Geometry:
-    """One after another; where the last is the ground, it stays that."""
+    """The parts one after another; if the last is the ground, it remains the ground."""
     firsts = (0, *accumulate(len(part.coordinates) for part in parts))
     first_triangles = (0, *accumulate(len(part.triangles) for part in parts))
     alpha_masks, rows = stack_cutouts([(part.alpha_masks, part.triangle_cutout) for part in parts])
@@ -423,7 +429,7 @@ def _stacked(parts: Sequence[Geometry]) -> Geometry:
 
 
 def _single_sided(thing: Thing, mesh: Mesh) -> NDArray[np.int32]:
-    """The triangles of a thing that a camera sees from their fronts alone: none, unless its entry has `faces: as_file`."""
+    """The triangles of a thing that a camera sees only from the front: none, unless its entry has `faces: as_file`."""
     if thing.model.faces is None:
         return np.empty(0, np.int32)
     is_single = np.array([not material.double_sided for material in mesh.materials])
@@ -431,13 +437,14 @@ def _single_sided(thing: Thing, mesh: Mesh) -> NDArray[np.int32]:
 
 
 def _offset(parts: Sequence[NDArray[np.int32]], firsts: Sequence[int]) -> NDArray[np.int32]:
-    """Numbers of triangles, counted in each part, as those of the whole."""
+    """Triangle numbers that count within each part, converted to numbers in the whole."""
     moved = (part + np.int32(first) for part, first in zip(parts, firsts, strict=False))
     return np.concatenate([np.empty(0, np.int32), *moved])
 
 
 def _offset_triangles(parts: Sequence[NDArray[np.int32]], firsts: Sequence[int]) -> NDArray[np.int32]:
-    """Triangles (T, 3) of parts whose vertices begin at `firsts`, written in place: a thousand instances are large."""
+    """Triangles (T, 3) of parts whose vertices begin at `firsts`, overwritten in place because a thousand instances are large.
+    """
     triangles = np.empty((sum(map(len, parts)), 3), np.int32)
     stop = 0
     for part, first in zip(parts, firsts, strict=False):
@@ -447,7 +454,7 @@ def _offset_triangles(parts: Sequence[NDArray[np.int32]], firsts: Sequence[int])
 
 
 def _are_used(meshes: Sequence[Mesh]) -> NDArray[np.bool_]:
-    """Of each vertex of these meshes, (V,): whether it is a triangle's corner; a mesh that occurs again is looked at once."""
+    """Whether each vertex of these meshes is a corner of a triangle, (V,); a repeated mesh is processed once."""
     known: dict[int, NDArray[np.bool_]] = {}
     for mesh in meshes:
         if id(mesh) not in known:
@@ -457,7 +464,7 @@ def _are_used(meshes: Sequence[Mesh]) -> NDArray[np.bool_]:
 
 
 def _ground(bounds: NDArray[np.float64], floor: Floor | None) -> Geometry:
-    """A plane in two halves, below all that is placed, or where `floor` says, counter-clockwise seen from above."""
+    """A plane in two halves, below all placed things or at the height of `floor`, counter-clockwise seen from above."""
     corners = _ground_corners(bounds, floor)
     background, none = np.full(2, BACKGROUND, np.int32), np.empty(0, np.int32)
     return Geometry(
@@ -483,7 +490,7 @@ def _ground(bounds: NDArray[np.float64], floor: Floor | None) -> Geometry:
 
 
 def _ground_corners(bounds: NDArray[np.float64], floor: Floor | None) -> Corner:
-    """Corners (4, 3) of the ground below things of these bounds (N, 2, 3)."""
+    """Corners (4, 3) of the ground below things with these bounds (N, 2, 3)."""
     low, high = _extent(bounds)
     x, y = (low[:2] + high[:2]) / 2
     z = low[2] if floor is None else floor.under(low[2])
@@ -505,7 +512,7 @@ def _bound(geometry: Geometry, i: int) -> None:
 
 
 def read_only(array: NDArray[np.float32]) -> NDArray[np.float32]:
-    """A view that cannot be written to, whatever the array is: kernels are compiled once for both."""
+    """A read-only view of the array, even if the array is read-only already, so that kernels are compiled once for both."""
     view = np.ascontiguousarray(array).view()
     view.setflags(write=False)
     return view

@@ -1,7 +1,7 @@
-"""Channels from the visibility buffer, one kernel each.
+"""The channels computed from the visibility buffer, one kernel each.
 
-A sample's ray is p = (x + .5, y + .5, 1) against vertices in homogeneous pixels for a pinhole, or its row of a ray table
-against vertices in camera axes for a distorted lens; `rays` is (0, 0, 3) for a pinhole. Exact (no fastmath).
+For a pinhole, a sample's ray is p = (x + .5, y + .5, 1) against vertices in homogeneous pixels; `rays` is then (0, 0, 3). For a
+distorted lens, it is the sample's row of a ray table, against vertices in camera axes. The kernels are exact (no fastmath).
 """
 
 from __future__ import annotations
@@ -13,13 +13,13 @@ import numpy as np
 from viewsphere.kernels.jit import inner, njit
 
 ONE = np.float32(1)
-NONE = -2  # stands for no triangle yet; the background is -1
-AHEAD = 64  # pixels that are compared at once: so many that compilers emit vectors instead of unrolling
+NONE = -2  # means no triangle yet; the background is -1
+AHEAD = 64  # pixels that are compared at once: enough for compilers to emit vectors instead of unrolling
 
 
 @njit
 def depths(inverse, rays, out):
-    """Depth along z: s times the ray's z; infinite where nothing is seen."""
+    """Depth along z: s times the ray's z; infinite if no triangle is visible."""
     height, width = inverse.shape
     table = rays.shape[0] > 0
     for y in range(height):
@@ -31,7 +31,7 @@ def depths(inverse, rays, out):
 
 @njit
 def positions(inverse, rays, world_from_ray, center, out):
-    """center + world_from_ray ray / inverse, the seen point in world axes; NaN where nothing is seen."""
+    """center + world_from_ray ray / inverse, the visible point in world axes; NaN if no triangle is visible."""
     height, width = inverse.shape
     table = rays.shape[0] > 0
     m = world_from_ray
@@ -48,7 +48,7 @@ def positions(inverse, rays, world_from_ray, center, out):
 
 @njit
 def labels(seen, table, empty, out):
-    """table[triangle] for each pixel, 0 beyond the table's end, or `empty` where no triangle is seen."""
+    """table[triangle] for each pixel, 0 beyond the table's end, or `empty` if no triangle is visible."""
     height, width = seen.shape
     for y in range(height):
         for x in range(width):
@@ -58,7 +58,9 @@ def labels(seen, table, empty, out):
 
 @njit
 def instances(seen, objects, ids, area, box):
-    """Ids of the objects seen; adds to each id's pixel count (count + 1,), widens its tight half-open box (count + 1, 4)."""
+    """The ids of the visible objects. Adds to each id's pixel count (count + 1,), and grows its tight half-open box (count + 1,
+    4).
+    """
     height, width = np.uintp(seen.shape[0]), np.uintp(seen.shape[1])
     for y in range(height):
         for x in range(width):
@@ -81,7 +83,7 @@ def instances(seen, objects, ids, area, box):
 
 @inner
 def _goes_on(ids, y, x, own):
-    """Return whether the next AHEAD pixels of row y, from x on, show object `own`, too."""
+    """Return whether the next AHEAD pixels of row y, from x on, also show object `own`."""
     different = np.int32(0)
     for k in range(np.uintp(AHEAD)):
         different |= ids[y, x + k] ^ own
@@ -90,7 +92,7 @@ def _goes_on(ids, y, x, own):
 
 @inner
 def _edges(q, i0, i1, i2, px, py, pz):
-    """det[p, q_j, q_k] of the three edges. Taking p's share from each corner first keeps them exact for tiny triangles."""
+    """det[p, q_j, q_k] of the three edges. Subtracting p's share from each corner first keeps them exact for tiny triangles."""
     a, b, c = np.uintp(0), np.uintp(1), np.uintp(2)
     if pz == 1.0:
         w0, w1, w2 = q[i0, c], q[i1, c], q[i2, c]
@@ -123,7 +125,7 @@ def weights_at(q, i0, i1, i2, px, py, pz):
 
 @njit
 def barycentrics(seen, triangles, q, rays, out):
-    """The weights of the seen triangle's corners; 0 where nothing is seen."""
+    """The weights of the visible triangle's corners; 0 if no triangle is visible."""
     height, width = seen.shape
     table = rays.shape[0] > 0
     for y in range(height):
@@ -139,7 +141,7 @@ def barycentrics(seen, triangles, q, rays, out):
 
 @njit
 def coordinates(seen, triangles, objects, q, rays, values, out):
-    """Vertex values (V, 3) interpolated where an object is seen; NaN elsewhere."""
+    """Vertex values (V, 3) interpolated on visible objects; NaN elsewhere."""
     height, width = seen.shape
     table = rays.shape[0] > 0
     for y in range(height):
@@ -157,8 +159,8 @@ def coordinates(seen, triangles, objects, q, rays, values, out):
 
 @njit
 def own_boxes(values, is_used, vertex_start, area, boxes):
-    """The lowest and the highest of the used vertices of each object i of which anything is seen (area[i] pixels), in
-    boxes (count + 1, 2, 3).
+    """The lowest and the highest coordinates of the used vertices of each visible object i (area[i] pixels), in boxes (count +
+    1, 2, 3).
     """
     for i in range(1, boxes.shape[0]):
         if area[i] == 0:
@@ -176,7 +178,9 @@ def own_boxes(values, is_used, vertex_start, area, boxes):
 
 @njit
 def nocs(seen, triangles, objects, q, rays, values, middle, diagonal, out):
-    """`coordinates` from the middle (N + 1, 3) of each object's box, over its diagonal (N + 1,), plus a half; else NaN."""
+    """`coordinates` relative to the middle (N + 1, 3) of each object's box, over its diagonal (N + 1,), plus a half; NaN
+    elsewhere.
+    """
     height, width = seen.shape
     table = rays.shape[0] > 0
     for y in range(height):
@@ -196,7 +200,7 @@ def nocs(seen, triangles, objects, q, rays, values, middle, diagonal, out):
 
 @njit
 def normals_geometric(seen, triangle_normals, rays, camera_from_p, rotation, out):
-    """The triangle's normal in camera axes, towards the camera; 0 where nothing is seen or the triangle is degenerate."""
+    """The triangle's normal in camera axes, towards the camera; 0 if no triangle is visible or the triangle is degenerate."""
     height, width = seen.shape
     table = rays.shape[0] > 0
     m = camera_from_p
@@ -228,7 +232,7 @@ def _rotated(r, x, y, z):
 def normals_shading(seen, triangles, q, rays, values, side, triangle_normals, camera_from_p, rotation, out):
     """Interpolated vertex normals (`values`, world) in camera axes, on the triangle's visible side, never away from the ray.
 
-    `side` is 1 where a triangle's vertex normals agree with its winding, -1 where they oppose it, 2 or -2 likewise where all
+    `side` is 1 if a triangle's vertex normals agree with its winding, -1 if they oppose it. It is 2 or -2 if, in addition, all
     three vertex normals equal the triangle's own.
     """
     height, width = seen.shape

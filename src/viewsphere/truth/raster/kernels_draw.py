@@ -1,10 +1,10 @@
 """Exact rasterisation through a pinhole: homogeneous edge functions in float64, no clipping, no snapping, no fastmath.
 
-With q_i = K (R X_i + t) not divided by w, a pixel centre p = (x + .5, y + .5, 1) is covered by a triangle where all three
-e_i(p) = det[p, q_j, q_k] have one sign and 1/z = n.p / n.q_0 > 0, n = (q_1 - q_0) x (q_2 - q_0) = e_0 + e_1 + e_2: exactly the
-ray's intersection (Olano and Greer 1997, "Triangle scan conversion using 2D homogeneous coordinates"). Two triangles that share
-an edge evaluate the same products with opposite signs, so no pixel centre falls between them. Triangles are drawn in order, and
-a later one replaces an earlier one only if its 1/z is greater by more than rounding makes it (`NEARER`).
+With q_i = K (R X_i + t) not divided by w, a pixel centre p = (x + .5, y + .5, 1) is covered by a triangle if all three e_i(p) =
+det[p, q_j, q_k] have one sign and 1/z = n.p / n.q_0 > 0, n = (q_1 - q_0) x (q_2 - q_0) = e_0 + e_1 + e_2: exactly the ray's
+intersection (Olano and Greer 1997, "Triangle scan conversion using 2D homogeneous coordinates"). Two triangles that share an
+edge evaluate the same products with opposite signs, so no pixel centre falls between them. Triangles are drawn in order, and a
+later one replaces an earlier one only if its 1/z is greater by more than rounding makes it (`NEARER`).
 """
 
 from __future__ import annotations
@@ -17,14 +17,14 @@ from viewsphere.kernels.jit import inner, njit
 from viewsphere.truth.kernel_constants import FOUR, NEARER
 from viewsphere.truth.raster.kernels_row import draw_four, shows_farther
 
-EPSILON = 1e-5  # pixels by which a bounding box is widened: more than the edge functions' rounding
+EPSILON = 1e-5  # pixels by which a bounding box is widened: more than the rounding error of the edge functions
 BEHIND = -(1 << 30)
 ROUNDED_UP = 1.0 + 1e-9  # bounds the rounding of 1/z between a triangle's corners
 SLIVER = 1e-5  # twice the area in pixels below which the sign of a triangle's area is not trusted
 SMALL = 2 * FOUR  # pixels: up to this width testing every pixel is faster than computing spans
-NEVER, CLAMP, MIRROR = -2, 1, 2  # as in alpha_masks.py; values below NEVER stand for endless triangles
-ENDLESS_1 = -3  # of an endless triangle's edges only the one opposite corner 1 counts; else the one opposite corner 2
-HORIZON = 1e-10  # of 1/z's coefficients: a point nearer than this to a plane's horizon may be beyond it by rounding
+NEVER, CLAMP, MIRROR = -2, 1, 2  # as in alpha_masks.py; values below NEVER mark endless triangles
+ENDLESS_1 = -3  # only the edge opposite corner 1 of an endless triangle counts; otherwise the edge opposite corner 2
+HORIZON = 1e-10  # share of 1/z's coefficients: a point nearer than this to a plane's horizon may be beyond it by rounding
 
 
 @njit
@@ -42,8 +42,8 @@ def transform(vertices, start, stop, m, homogeneous):
 def cells(q, samples, x0, y0, width, height, cell):
     """Range of pixels of each vertex's own bounding box, (n, 4) int32: x, y of the first pixel, -x, -y of the last.
 
-    The numbers are clamped so that their minimum over three vertices is the triangle's box in the canvas, empty if the triangle
-    is outside; BEHIND where w <= 0.
+    The numbers are clamped so that their minimum over three vertices is the triangle's box in the canvas, which is empty if the
+    triangle is outside. They are BEHIND if w <= 0.
     """
     for i in range(q.shape[0]):
         w = q[i, 2]
@@ -107,9 +107,9 @@ def negated(e):
 
 @inner
 def edges_inside(q0, q1, q2, normal, det, cutout):
-    """Coefficients of a triangle's edges that are not negative inside, whatever its winding; `plane` gives normal and det.
+    """Coefficients of a triangle's edges that are not negative inside, for either winding; `plane` gives normal and det.
 
-    The edges of an endless triangle are one of its own, and the horizon of its plane, where 1/z = normal.p / det becomes 0.
+    An endless triangle has one edge of its own, and the horizon of its plane, where 1/z = normal.p / det becomes 0.
     """
     e0, e1, e2 = edge(q1, q2), edge(q2, q0), edge(q0, q1)
     if det < 0.0:
@@ -128,10 +128,10 @@ def _inside(a, b, c, px, f0, f1, f2):
 
 @njit
 def draw(q, cell, triangles, span, canvas, cutout, alpha_masks, nearest, seen):
-    """Draw triangles into nearest (1/z, 0 where none) and seen (triangle, -1 where none), both in C order.
+    """Draw triangles into nearest (1/z, 0 if none) and seen (triangle, -1 if none), both in C order.
 
-    `span` is the first triangle, the one after the last, and the vertex that q[0] stands for; `canvas` is the number of samples
-    along a pixel's side and the canvas' first sample (x, y). `cell` of the vertices of endless triangles is BEHIND.
+    `span` is the first triangle, the one after the last, and the number of the vertex in q[0]. `canvas` is the number of
+    samples along a pixel's side and the canvas' first sample (x, y). `cell` is BEHIND for the vertices of endless triangles.
     """
     height, width = nearest.shape
     first, last, base = span
@@ -173,7 +173,7 @@ def draw(q, cell, triangles, span, canvas, cutout, alpha_masks, nearest, seen):
 
 @inner
 def hidden(nearest, xa, ya, xb, yb, most):
-    """Return whether all pixels of a narrow box, and the pixels drawn together with them, show something nearer than 1/z =
+    """Return whether all pixels of a narrow box, and the pixels drawn together with them, show a surface nearer than 1/z =
     most.
     """
     width = nearest.shape[1]
@@ -194,7 +194,7 @@ def _fours(xa, xb, width):
 
 @inner
 def _draw_small(t, e0, e1, e2, n, box, canvas, nearest, seen):
-    """Draw a narrow triangle: every pixel of its box is tested, and pixels beside the box, which it does not cover."""
+    """Draw a narrow triangle: test every pixel of its box, and pixels beside the box, which the triangle does not cover."""
     xa, ya, xb, yb = box
     samples, x0, y0 = canvas
     step, width = 1.0 / samples, nearest.shape[1]
@@ -213,7 +213,7 @@ def _draw_small(t, e0, e1, e2, n, box, canvas, nearest, seen):
 def _draw_rows(t, e0, e1, e2, n, box, canvas, nearest, seen):
     """Draw a wide triangle row by row: first and last pixel are computed, then settled by the exact test.
 
-    The crossing -f / e uses the very f of the test, so it is off by a few of its own roundings: far less than EPSILON.
+    The crossing -f / e uses the same f as the test, so its error is a few roundings of f: far less than EPSILON.
     """
     xa, ya, xb, yb = box
     samples, x0, y0 = canvas
@@ -249,13 +249,15 @@ def _draw_rows(t, e0, e1, e2, n, box, canvas, nearest, seen):
 
 @inner
 def crossing_at(e, samples):
-    """The factor by which f is multiplied to give the sample at which e x + f is 0; 0 for an edge along the row."""
+    """The factor that maps f to the sample at which e x + f is 0; 0 for an edge along the row."""
     return -samples / e if e != 0.0 else 0.0
 
 
 @inner
 def _draw_checked(t, q0, q1, q2, box, canvas, bounds, cutout, alpha_masks, nearest, seen):
-    """Draw a cut-out, or a sliver whose facing is uncertain: either sign will do, 1/z stays within the corners' `bounds`."""
+    """Draw a cut-out, or a sliver with uncertain facing: either sign passes the test, and 1/z is clamped to the corners'
+    `bounds`.
+    """
     xa, ya, xb, yb = box
     samples, x0, y0 = canvas
     step = 1.0 / samples
@@ -276,6 +278,6 @@ def _draw_checked(t, q0, q1, q2, box, canvas, bounds, cutout, alpha_masks, neare
 
 @inner
 def hits_surface(alpha_masks, cutout, e0, e1, e2):
-    """Return whether the triangle is surface where its edge functions have these values: everywhere without a cut-out."""
+    """Return whether the triangle is surface at these values of its edge functions: everywhere without a cut-out."""
     total = e0 + e1 + e2
     return cutout < 0 or (total != 0.0 and is_surface(alpha_masks, cutout, e0 / total, e1 / total, e2 / total))

@@ -1,4 +1,4 @@
-"""Meshes placed in the world: written out, because BLAS rounds differently from processor to processor."""
+"""Meshes placed in the world. The products are written out, because BLAS rounds differently from processor to processor."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ import numpy as np
 
 from viewsphere.kernels.jit import inner, njit
 
-FLAT = 1e-5  # greatest difference of a corner's normal from its triangle's where the triangle counts as flat
+FLAT = 1e-5  # maximum difference between a corner's normal and its triangle's for a triangle that counts as flat
 
 
 @inner
 def there(m, x, y, z):
-    """The world point of a place in a thing's axes, in the pose m (4, 4)."""
+    """The world point of a place in a thing's axes, for the pose m (4, 4)."""
     x, y, z = np.float64(x), np.float64(y), np.float64(z)
     return (
         m[0, 0] * x + m[0, 1] * y + m[0, 2] * z + m[0, 3],
@@ -24,21 +24,21 @@ def there(m, x, y, z):
 
 @inner
 def turned(m, r, a, b, c):
-    """Coordinate r in the world of a direction in a thing's axes."""
+    """World coordinate r of a direction in a thing's axes."""
     a, b, c = np.float64(a), np.float64(b), np.float64(c)
     return np.float32(m[r, 0] * a + m[r, 1] * b + m[r, 2] * c + m[r, 3] * 0.0)
 
 
 @njit
 def place(m, own, vertices):
-    """World vertices (V, 3) float64 of a mesh in the pose m (4, 4)."""
+    """World vertices (V, 3) float64 of a mesh with the pose m (4, 4)."""
     for i in range(own.shape[0]):
         vertices[i, 0], vertices[i, 1], vertices[i, 2] = there(m, own[i, 0], own[i, 1], own[i, 2])
 
 
 @njit
 def turn(m, own, normals):
-    """World normals (V, 3) float32 of a mesh in the pose m (4, 4)."""
+    """World normals (V, 3) float32 of a mesh with the pose m (4, 4)."""
     for i in range(own.shape[0]):
         for r in range(3):
             normals[i, r] = turned(m, r, own[i, 0], own[i, 1], own[i, 2])
@@ -46,7 +46,8 @@ def turn(m, own, normals):
 
 @njit
 def bound(m, own, is_used, bounds):
-    """Fill bounds (2, 3) with the lowest and the highest of a mesh's used world vertices, infinite where no vertex is used."""
+    """Fill bounds (2, 3) with the lowest and the highest world coordinates of a mesh's used vertices, infinite if none is used.
+    """
     for r in range(3):
         bounds[0, r], bounds[1, r] = np.inf, -np.inf
     for i in range(own.shape[0]):
@@ -59,8 +60,8 @@ def bound(m, own, is_used, bounds):
 
 @njit
 def corners(chosen, triangles, own, starts, poses, ground, out):
-    """World corners (n, 3, 3) of the chosen triangles (n,), none for -1. Thing i owns the vertices from starts[i] on, the
-    ground those from the last but one.
+    """World corners (n, 3, 3) of the chosen triangles (n,), not written for -1. Thing i has the vertices from starts[i] on, the
+    ground those from the last but one entry on.
     """
     i = 0
     for k in range(chosen.shape[0]):
@@ -79,7 +80,9 @@ def corners(chosen, triangles, own, starts, poses, ground, out):
 
 @njit
 def project(own, start, poses, m, base, stop, homogeneous):
-    """As `kernels_draw.transform`, of those vertices [base, stop) of the things in these poses, which begin at `start`."""
+    """The result of `kernels_draw.transform` for the vertices [base, stop) of things with these poses, whose vertices begin at
+    `start`.
+    """
     for i in range(poses.shape[0]):
         for v in range(max(start[i], base), min(start[i + 1], stop)):
             x, y, z = there(poses[i], own[v, 0], own[v, 1], own[v, 2])
@@ -91,7 +94,7 @@ def project(own, start, poses, m, base, stop, homogeneous):
 
 @njit
 def face(vertices, normals, triangles, base, own, side):
-    """Normals (T, 3) float32 and sides (T,) int8 of triangles, whose vertices count from `base`, as `Geometry` has them."""
+    """Normals (T, 3) float32 and sides (T,) int8 of triangles, whose vertices count from `base`, as defined in `Geometry`."""
     for t in range(triangles.shape[0]):
         i, j, k = np.uintp(triangles[t, 0] - base), np.uintp(triangles[t, 1] - base), np.uintp(triangles[t, 2] - base)
         ux, uy, uz = vertices[j, 0] - vertices[i, 0], vertices[j, 1] - vertices[i, 1], vertices[j, 2] - vertices[i, 2]

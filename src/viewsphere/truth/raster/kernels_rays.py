@@ -1,10 +1,11 @@
 """Exact rasterisation along a table of rays (distorted lenses).
 
-A ray d meets a triangle where all e_i . d have the sign of det, e_i = X_j x X_k in camera axes: the pinhole's test without the
-projection, so it holds for rays that look sideways or back. Two indices say which rays to test. Small triangles use a cube
-around the camera whose faces are cut into cells, each with the pixels whose rays pass it: projected on a face, a triangle is
-bounded by its corners. All other triangles use a quadtree over the picture: a node keeps the box of its rays, and as products
-and sums are monotone in floating point too, an edge function over the box bounds it over the rays. No hit is lost either way.
+A ray d hits a triangle if all e_i . d have the sign of det, with e_i = X_j x X_k in camera axes. This is the pinhole's test
+without the projection, so it also holds for rays that point sideways or back. Two indices select the rays to test. Small
+triangles use a cube around the camera. Its faces are cut into cells, each with the pixels whose rays pass it, and a triangle
+projected on a face is bounded by its corners. All other triangles use a quadtree over the picture: each node stores the box of
+its rays. Products and sums are monotone in floating point too, so an edge function over the box bounds its values over the
+rays. Neither index loses a hit.
 """
 
 from __future__ import annotations
@@ -18,17 +19,17 @@ from viewsphere.truth.kernel_constants import NEARER
 from viewsphere.truth.raster.kernels_draw import NEVER, edges_inside, hits_surface, plane
 
 LEAF = 8  # pixels along a leaf's side
-MANY_CELLS, MANY_PIXELS = 64, 1024  # cells and pixels of a triangle's box beyond which the tree is faster
+MANY_CELLS, MANY_PIXELS = 64, 1024  # limits on the cells and pixels of a triangle's box, beyond which the tree is faster
 WIDER = 1e-9  # widening of a triangle's box on a face: more than the rounding of a projection
-SLIVER = 1e-12  # det, as a share of the product of the corners' distances, below which its sign is not trusted
+SLIVER = 1e-12  # limit of det, as a share of the product of the corners' distances, below which its sign is not trusted
 ORIGIN = (0.0, 0.0, 0.0)
 NO_BOX = (0, 0, -1, -1)
-ANY_DEPTH = (0.0, np.inf)  # bounds of 1/s where nothing better is known
+ANY_DEPTH = (0.0, np.inf)  # default bounds of 1/s
 
 
 @njit(_nrt=True)
 def tree_levels(height, width):
-    """Index of the first node, rows and columns of each level, leaves first. (L, 3) int64."""
+    """Index of the first node, rows and columns of each level, leaves first: (L, 3) int64."""
     rows, columns = (height + LEAF - 1) // LEAF, (width + LEAF - 1) // LEAF
     levels = np.zeros((64, 3), np.int64)
     count, start = 0, 0
@@ -69,7 +70,8 @@ def build_tree(rays, levels):
 
 @inner
 def _on_face(face, x, y, z):
-    """Projection on a cube's face (0 to 5: +z, -z, +x, -x, +y, -y) and the distance along its axis, not positive if behind."""
+    """The projection on a cube's face (0 to 5: +z, -z, +x, -x, +y, -y) and the distance along its axis; not positive if behind.
+    """
     sign = 1.0 - 2.0 * (face % 2)
     if face < 2:
         return x / (sign * z), y / (sign * z), sign * z
@@ -141,7 +143,7 @@ def _lowest(e, box):
 
 @inner
 def _may_hit(e0, e1, e2, sliver, box):
-    """Return whether some ray in the box may pass the test of all three edges; for a sliver also with the other sign."""
+    """Return whether a ray in the box may pass the test of all three edges; for a sliver, also with the opposite sign."""
     if box[0] > box[3]:
         return False
     if _highest(e0, box) >= 0.0 and _highest(e1, box) >= 0.0 and _highest(e2, box) >= 0.0:
@@ -177,10 +179,10 @@ def _distance(a, b):
 
 @njit(_nrt=True)
 def draw(q, triangles, span, table, origin, unit, cutout, alpha_masks, nearest, seen):
-    """Draw triangles into nearest (1/s, 0 where none) and seen (triangle, -1 where none).
+    """Draw triangles into nearest (1/s, 0 if none) and seen (triangle, -1 if none).
 
-    `span` is the first triangle, the one after the last, and the vertex that q[0] stands for; q is in camera axes; `table` is
-    (rays, levels, boxes, cells) and `origin` the canvas' first pixel (x, y) in it. `unit` says that the rays have length 1
+    `span` is the first triangle, the one after the last, and the number of the vertex in q[0]; q is in camera axes. `table` is
+    (rays, levels, boxes, cells), and `origin` is the canvas' first pixel (x, y) in it. If `unit` is set, the rays have length 1
     rather than z = 1.
     """
     rays, levels, boxes, cells = table
@@ -221,7 +223,7 @@ def leaf_list(levels):
 def touched(e0, e1, e2, sliver, levels, boxes, window, leaves):
     """Number of leaves in the window (x0, y0, x1, y1) that the triangle may touch; their first pixels (x, y) in `leaves`.
 
-    The end of the list serves as the stack: a tree of L levels never has more than 3 L + 1 nodes waiting.
+    The end of the list is used as the stack: a tree of L levels never has more than 3 L + 1 pending nodes.
     """
     found, top = 0, leaves.shape[0]
     leaves[top - 1] = (len(levels) - 1, 0, 0)

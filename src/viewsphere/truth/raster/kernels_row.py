@@ -1,4 +1,4 @@
-"""Four samples at once, in the processor's vectors: the same sums as for single samples, bit for bit."""
+"""Four samples at once in vector registers: the sums are bitwise the same as for single samples."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ _EDGES = nb.types.UniTuple(nb.float64, 3)
 
 
 def _spread(builder: Any, value: Any) -> Any:
-    """One number in all lanes."""
+    """One number copied to all lanes."""
     one = builder.insert_element(ir.Constant(ir.VectorType(value.type, FOUR), ir.Undefined), value, _WHOLE(0))
     return builder.shuffle_vector(one, one, ir.Constant(_WHOLES, [0] * FOUR))
 
 
 def _from(context: Any, builder: Any, kind: Any, array: Any, at: Any, lanes: Any) -> Any:
-    """Pointer to the lanes of an array from this flat index on."""
+    """The pointer to the lanes of an array from this flat index on."""
     data = context.make_array(kind)(context, builder, array).data
     return builder.bitcast(builder.gep(data, [at]), lanes.as_pointer())
 
@@ -44,10 +44,10 @@ def shows_farther(typing: Any, nearest: Any, at: Any, most: Any) -> Any:
 def draw_four(
     typing: Any, nearest: Any, seen: Any, at: Any, t: Any, first: Any, step: Any, e: Any, f: Any, n: Any, s: Any
 ) -> Any:
-    """Show triangle t at those of four samples that are inside it and nearer; the samples begin at flat index `at`.
+    """Write triangle t to each of four samples that is inside it and nearer; the samples begin at flat index `at`.
 
-    Sample i is at (first + i) step along the row. It is inside where e x + f is not negative for all three edges; its 1/z,
-    n x + s, must exceed the 1/z shown so far times NEARER.
+    Sample i is at (first + i) step along the row. It is inside if e x + f is not negative for all three edges; its 1/z, n x +
+    s, must exceed the 1/z shown so far times NEARER.
     """
 
     def code(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
@@ -77,10 +77,10 @@ def draw_four(
 def meet_four(
     typing: Any, x: Any, y: Any, nearest: Any, met: Any, own: Any, at: Any, t: Any, e0: Any, e1: Any, e2: Any, n: Any
 ) -> Any:
-    """Let triangle t be met by those of four points that are inside it, behind it, and not its own; they begin at index `at`.
+    """Record triangle t for each of four points that is inside it, behind it, and not its own; the points begin at index `at`.
 
-    A point (x, y) is inside where e . (x, y, 1) is not negative for all three edges; its 1/z there, n . (x, y, 1), must exceed
-    the 1/z met so far times NEARER.
+    A point (x, y) is inside if e . (x, y, 1) is not negative for all three edges; its 1/z there, n . (x, y, 1), must exceed the
+    1/z met so far times NEARER.
     """
 
     def code(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:

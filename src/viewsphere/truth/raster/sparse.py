@@ -1,4 +1,4 @@
-"""Arrays of which only parts are ever written, such as those of the things in a picture."""
+"""Arrays that are written only in part, such as those of the things in a picture."""
 
 from __future__ import annotations
 
@@ -12,20 +12,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 LEAST = 1 << 25
-"""Bytes from which on an array has pages of its own: smaller ones are on the heap, whose memory is there already."""
+"""Minimum size in bytes of an array with pages of its own; smaller ones use the heap, whose memory is already mapped."""
 
 MOST = 16
-"""Arrays, one after another, that have the same pages: those of what is out of sight by then are given back."""
+"""Number of successive arrays that reuse the same pages; then pages of things no longer in sight are released."""
 
 
 Kind = TypeVar("Kind", bound=np.generic)
 
 
 def sparse(shape: tuple[int, ...], dtype: type[Kind]) -> NDArray[Kind]:
-    """An uninitialised array that takes memory where it is written to, page by page.
+    """An uninitialised array that uses memory only for the pages that are written.
 
-    numpy asks for pages of 2 MB, each of which is there as a whole once any of it is written: of things of half a megabyte, a
-    few of which are in the picture, that is nearly all. Systems without such pages give memory like this anyway.
+    numpy requests pages of 2 MB, each of which becomes resident as soon as any of it is written. With things of half a
+    megabyte, a few of them in the picture, that is nearly the whole array. Systems without such pages behave like this anyway.
     """
     return Spare().array(shape, dtype)
 
@@ -38,14 +38,14 @@ class _Pages:
 
 @dataclass(eq=False)
 class Spare:
-    """Gives sparse arrays whose pages are those of an earlier one that nobody holds any more, where there is one: to get new
-    pages takes longer than to write to them.
+    """Gives sparse arrays that reuse the pages of an earlier, released array, if there is one: new pages take longer to get
+    than to write to.
     """
 
     _free: list[_Pages] = field(default_factory=list[_Pages])
 
     def array(self, shape: tuple[int, ...], dtype: type[Kind]) -> NDArray[Kind]:
-        """One like `sparse`."""
+        """An array like those of `sparse`."""
         count = math.prod(shape)
         size = count * np.dtype(dtype).itemsize
         if size < LEAST or not hasattr(mmap, "MADV_NOHUGEPAGE"):

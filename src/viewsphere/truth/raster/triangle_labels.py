@@ -20,10 +20,11 @@ Int32 = NDArray[np.int32]
 
 @dataclass(eq=False)
 class TriangleLabels:
-    """Numbers of triangles, (T,) int32 each: made when they are read first, and then held for all instants. Most recipes read
-    one of the five or none, and a thousand instances have millions of triangles.
+    """Numbers of triangles, (T,) int32 each, computed when they are first read and then kept for all instants. Most recipes
+    read at most one of the five, and a thousand instances have millions of triangles.
 
-    things and meshes: the objects', which come first; classes_behind: of the scenery and the ground behind them.
+    things and meshes: those of the objects, which come first. classes_behind: the classes of the scenery and the ground, which
+    follow.
     """
 
     things: tuple[Thing, ...]
@@ -47,12 +48,12 @@ class TriangleLabels:
 
     @cached_property
     def body_part(self) -> Int32:
-        """Parts of bodies; 0 where a triangle is of none."""
+        """Parts of bodies; 0 if a triangle belongs to none."""
         return self._filled(lambda _, mesh: 0 if mesh.triangle_body_part is None else mesh.triangle_body_part)
 
     @cached_property
     def classes(self) -> Int32:
-        """Classes of things, then those of the scenery and the ground, see `model.annotations.classes`."""
+        """Classes of things, then those of the scenery and the ground; see `model.annotations.classes`."""
         own = self._filled(lambda thing, _: thing_class(thing.model.category_id))
         return np.concatenate([own, *(classes() for classes in self.classes_behind)])
 

@@ -1,4 +1,4 @@
-"""The exact rasteriser's result: which triangle each pixel's ray meets first, and where."""
+"""The exact rasteriser's result: the triangle that each pixel's ray meets first, and its distance."""
 
 from __future__ import annotations
 
@@ -17,16 +17,16 @@ from viewsphere.truth.raster.geometry import Geometry, seen_from
 LARGEST_AROUND = 4_000_000  # pixels of a ray table that reaches beyond the image (100 MB)
 
 EDGE_ON = 1e-9
-"""A camera's height above the ground, as a share of its distance from the origin and a metre, that is nothing but rounding."""
+"""Height of a camera above the ground that counts as rounding error, relative to its distance from the origin plus a metre."""
 
 
 OUTSIDE = (-1e9, 0.0, 1.0, 1.0)
-"""`homogeneous` of a vertex that is far from the picture."""
+"""The `homogeneous` value of a vertex far from the picture."""
 
 _OUTSIDE = np.array(OUTSIDE)
 
 _CORNERS = np.indices((2, 2, 2)).reshape(3, 8).T
-"""For each corner of a box, along each axis: 0 for the lowest, 1 for the highest."""
+"""For each corner of a box, along each axis: 0 for the lowest, 1 for the highest coordinate."""
 
 Runs = NDArray[np.int64]
 """Ranges [first, stop), (n, 2)."""
@@ -34,8 +34,9 @@ Runs = NDArray[np.int64]
 
 @dataclass(frozen=True, eq=False)
 class Instances:
-    """ids (H, W) int32: the object seen, 0 where none is. By id: area (N + 1,), the number of visible pixels, and box (N + 1,
-    4), the tight half-open box (x0, y0, x1, y1) of the visible pixels; meaningless where the area is 0, and for id 0.
+    """ids (H, W) int32: the visible object, 0 if there is none. By id: area (N + 1,), the number of visible pixels, and box (N
+    + 1, 4), the tight half-open box (x0, y0, x1, y1) of the visible pixels. The box is undefined if the area is 0, and for id
+    0.
     """
 
     ids: NDArray[np.int32]
@@ -45,20 +46,22 @@ class Instances:
 
 @dataclass(frozen=True, eq=False)
 class Visibility:
-    """triangle (H, W) int32: the one seen, -1 where none is; inverse_depth (H, W) float32: 1/s, 0 where no triangle is seen.
+    """triangle (H, W) int32: the visible triangle, -1 if there is none; inverse_depth (H, W) float32: 1/s, 0 if no triangle is
+    visible.
 
-    The seen point is `center + R.T @ (s * ray)`, ray from `geometry.camera.pixel_rays`: its z is 1 (so s is z-depth) for a
-    pinhole and for Brown-Conrady, and its length is 1 for a fisheye and a scan, whose rays may look sideways or back.
+    The visible point is `center + R.T @ (s * ray)`, with the ray from `geometry.camera.pixel_rays`. The ray's z is 1 (so s is
+    z-depth) for a pinhole and for Brown-Conrady, and its length is 1 for a fisheye and a scan, whose rays may point sideways or
+    back.
     """
 
     triangle: NDArray[np.int32]
     inverse_depth: NDArray[np.float32]
     corners: NDArray[np.float64] | None = None  # `homogeneous` of all vertices, which labels and the raster engine use again
-    exact: NDArray[np.float64] | None = None  # 1/s before it was rounded, where it was asked for
+    exact: NDArray[np.float64] | None = None  # 1/s before rounding, if requested
     _instances: dict[Geometry, Instances] = field(default_factory=dict[Geometry, Instances], repr=False)
 
     def instances(self, geometry: Geometry) -> Instances:
-        """The visible pixels of each object; `geometry` must be the one drawn. The arrays are kept: do not write to them."""
+        """The visible pixels of each object; `geometry` must be the drawn one. The arrays are cached: do not write to them."""
         if geometry not in self._instances:
             self._instances[geometry] = _count_instances(geometry, self.triangle)
         return self._instances[geometry]
@@ -86,16 +89,16 @@ def rasterize(
 ) -> Visibility:
     """Cast one ray through the centre of each pixel, exactly.
 
-    A later triangle is seen instead of an earlier one only if it is nearer by more than 2^-22 (2.4e-7) of its depth: of
-    surfaces in one place the first one is seen everywhere, so an object before the ground in which it lies.
+    A later triangle replaces an earlier one only if it is nearer by more than 2^-22 (2.4e-7) of its depth. So the first of
+    several coincident surfaces is always visible: an object is drawn in front of the ground it touches.
 
     A camera in the ground's plane sees none of it (see `is_edge_on`).
 
     `subdivision` 2 gives the (2H, 2W) buffer of the centres of a pixel's 2 x 2 quarters (edge anti-aliasing). With an
-    `object_id` only that object is drawn, without scenery and ground. `window` replaces the image by another rectangle of
-    pixels, which may lie outside the image; nothing is seen where the lens has no ray for a pixel. `corners`: `homogeneous` of
-    all vertices, where it is known. `keeps_exact`: keep 1/s before it was rounded, too, which labels that compare pictures
-    need; still pictures are spared its memory.
+    `object_id` only that object is drawn, without scenery and ground. `window` selects another rectangle of pixels instead of
+    the image, and may reach outside it; a pixel without a ray of the lens shows nothing. `corners`: `homogeneous` of all
+    vertices, if already computed. `keeps_exact`: also keep 1/s before rounding, which labels that compare pictures need. Still
+    pictures do not need that memory.
     """
     is_whole = not object_id and window is None
     if object_id:
@@ -111,13 +114,13 @@ def rasterize(
 
 
 def _known(corners: NDArray[np.float64], part: tuple[int, int, int, int]) -> NDArray[np.float64] | None:
-    """A part's vertices among all `homogeneous` ones; None for a thing that is left out there."""
+    """A part's vertices among all `homogeneous` ones; None for a thing that is left out of these."""
     q = corners[part[2] : part[3]]
     return None if len(q) and (q[0] == OUTSIDE).all() else q
 
 
 def with_ground(geometry: Geometry, camera: Camera, visibility: Visibility) -> Visibility:
-    """A new buffer: `visibility`, which shows everything else, with the ground of this geometry drawn into it."""
+    """A new buffer: `visibility`, which shows all other triangles, with the ground of this geometry drawn into it."""
     ground = geometry.triangle_start[-1], _last_drawn(geometry, camera), geometry.vertex_start[-1], len(geometry.coordinates)
     shown = visibility.inverse_depth.astype(np.float64), visibility.triangle.copy()
     nearest, seen = _draw(geometry, camera, 1, ground, None, homogeneous(geometry, camera, *ground[2:]), shown)
@@ -125,8 +128,8 @@ def with_ground(geometry: Geometry, camera: Camera, visibility: Visibility) -> V
 
 
 def is_edge_on(geometry: Geometry, camera: Camera) -> bool:
-    """Return whether the camera stands in the plane of the ground, as far as rounding can tell: what rays meet of the ground,
-    if anything, is then the camera's own centre.
+    """Return whether the camera is in the plane of the ground, within rounding error. Rays then meet the ground, if at all, at
+    the camera's own centre.
     """
     center = camera.center
     if geometry.ground_z is None:
@@ -135,7 +138,7 @@ def is_edge_on(geometry: Geometry, camera: Camera) -> bool:
 
 
 def _last_drawn(geometry: Geometry, camera: Camera) -> int:
-    """The end of the triangles that are drawn: the ground, which comes last, is not where it is seen edge-on."""
+    """The end of the triangles that are drawn. The ground, which comes last, is left out if it is seen edge-on."""
     return geometry.triangle_start[-1] if is_edge_on(geometry, camera) else len(geometry.triangles)
 
 
@@ -150,9 +153,9 @@ def _range(geometry: Geometry, object_id: int) -> tuple[int, int, int, int]:
 def homogeneous(geometry: Geometry, camera: Camera, base: int = 0, stop: int | None = None) -> NDArray[np.float64]:
     """Vertices [base, stop) before the perspective division, and the inverse of their third coordinate, (n, 4).
 
-    K (R X + t) for a pinhole; camera axes, R X + t, for a distorted lens. The inverse is infinite unless positive. Of all
-    vertices, those of things that lie outside of a pinhole's picture are left out: the first of them is `OUTSIDE`, the others
-    are arbitrary. `in_picture` gives those that are not.
+    They are K (R X + t) for a pinhole, and R X + t (camera axes) for a distorted lens. The inverse is infinite unless positive.
+    If all vertices are requested, things outside a pinhole's picture are left out: the first vertex of such a thing is
+    `OUTSIDE`, and the others are arbitrary. `in_picture` gives the remaining ones.
     """
     k = camera.K if camera.lens.is_linear else np.eye(3)
     moved = np.empty((3, 4))
@@ -170,42 +173,42 @@ def homogeneous(geometry: Geometry, camera: Camera, base: int = 0, stop: int | N
 
 
 def in_picture(geometry: Geometry, q: NDArray[np.float64], end: int | None = None) -> tuple[Runs, Runs]:
-    """The vertices and the triangles, up to `end` of these, that are not left out of `homogeneous` vertices q of all things:
-    as many runs of both, which belong together.
+    """The vertices and the triangles, up to `end`, that are not left out of `homogeneous` vertices q of all things: equally
+    many runs of both, in matching order.
     """
     without, last = left_out(geometry, q), len(geometry.triangles) if end is None else end
     return _shown(without, geometry.vertex_start, len(q)), _shown(without, geometry.triangle_start, last)
 
 
 def left_out(geometry: Geometry, q: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """Return a mask of the things that are left out of `homogeneous` vertices q of all of them."""
+    """Return a mask of the things that are left out of their `homogeneous` vertices q."""
     first = _first_vertices(geometry.vertex_start, len(q))
     return (q[first] == _OUTSIDE).all(axis=1) if len(q) else first < 0
 
 
 @lru_cache(maxsize=4)
 def _first_vertices(starts: tuple[int, ...], end: int) -> NDArray[np.intp]:
-    """Of each thing the first of so many vertices, or the last of all if there are fewer."""
+    """The first vertex of each thing, limited to `end` vertices; the last vertex of all if there are fewer."""
     return np.minimum(np.array(starts[:-1], np.intp), max(end - 1, 0))
 
 
 def _shown(without: NDArray[np.bool_], starts: tuple[int, ...], end: int) -> Runs:
-    """Runs, up to the end, of what things own that are not left out, from these starts on, and the ground. Do not write to it:
-    several frames ask for the same.
+    """Runs, up to the end, owned by things that are not left out, from these starts on, and the ground's run. Do not write to
+    the array: several frames share it.
     """
     return _known_runs(without.tobytes(), starts, end)
 
 
 @lru_cache(maxsize=16)
 def _known_runs(without: bytes, starts: tuple[int, ...], end: int) -> Runs:
-    """`_shown`, of the bytes of its flags."""
+    """The result of `_shown`, for the bytes of its flags."""
     is_shown = np.array([False, *~np.frombuffer(without, np.bool_), True, False])
     borders = np.flatnonzero(is_shown[1:] != is_shown[:-1])
     return np.array([*starts, end], np.int64)[borders].reshape(-1, 2)
 
 
 def projected(geometry: Geometry, m: NDArray[np.float64], base: int = 0, stop: int | None = None) -> NDArray[np.float64]:
-    """(n, 4): m (x, y, z, 1) of the vertices [base, stop), and the inverse of its third coordinate, as `homogeneous`."""
+    """(n, 4): m (x, y, z, 1) of the vertices [base, stop), and the inverse of its third coordinate, as in `homogeneous`."""
     end = len(geometry.coordinates) if stop is None else stop
     q = np.empty((end - base, 4))
     _project(geometry, m, base, end, q)
@@ -213,7 +216,7 @@ def projected(geometry: Geometry, m: NDArray[np.float64], base: int = 0, stop: i
 
 
 def _project(geometry: Geometry, m: NDArray[np.float64], base: int, stop: int, q: NDArray[np.float64]) -> None:
-    """Write `projected`."""
+    """Write the result of `projected`."""
     from viewsphere.truth.raster import kernels_draw, kernels_place
 
     starts = np.array(geometry.vertex_start, np.int64)
@@ -225,20 +228,20 @@ def _project(geometry: Geometry, m: NDArray[np.float64], base: int, stop: int, q
 
 
 def outside(geometry: Geometry, camera: Camera, pixels_from_world: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """Return a mask of the things that lie wholly outside of a pinhole's picture, a pixel away from it, or behind the camera.
+    """Return a mask of the things that are wholly outside a pinhole's picture, by at least a pixel, or behind the camera.
 
-    For such a thing, all corners of its box do so on one side.
+    For such a thing, all corners of its box are beyond the same side.
     """
     corners = geometry.bounds[:, _CORNERS, np.arange(3)]  # (N, 8, 3)
-    with np.errstate(invalid="ignore"):  # of things without triangles
+    with np.errstate(invalid="ignore"):  # the box of a thing without triangles
         u, v, w = (corners[..., 0] * m[0] + corners[..., 1] * m[1] + corners[..., 2] * m[2] + m[3] for m in pixels_from_world)
         sides = u < -w, u > (camera.width + 1) * w, v < -w, v > (camera.height + 1) * w, w < 0
         return np.logical_or.reduce([side.all(axis=1) for side in sides])
 
 
 def pixels_of(geometry: Geometry, corners: NDArray[np.float64], size: tuple[int, int]) -> NDArray[np.int32]:
-    """The range of pixels that each vertex may touch in a pinhole's picture of this (width, height), (n, 4), as
-    `kernels_points.boxes` has it; corners: `homogeneous` vertices.
+    """The range of pixels that each vertex may touch in a pinhole's picture of this (width, height), (n, 4), as defined in
+    `kernels_points.boxes`. `corners` are `homogeneous` vertices.
     """
     from viewsphere.truth.surface_points import kernels_points as kernels
 
@@ -254,19 +257,19 @@ def pixels_of(geometry: Geometry, corners: NDArray[np.float64], size: tuple[int,
 
 
 def lens_rays(camera: Camera) -> NDArray[np.float64] | None:
-    """The image's ray table, (H, W, 3), None for a pinhole; kept for the next frame, so it must not be written to."""
+    """The image's ray table, (H, W, 3); None for a pinhole. It is cached for the next frame, so do not write to it."""
     image = (0, 0, camera.width, camera.height)
     return None if camera.lens.is_linear else _ray_table(camera.intrinsics.model_dump_json(), 1, image).rays
 
 
 def lens_table(camera: Camera) -> RayTable:
-    """`lens_rays` of a distorted lens, with the indices over them."""
+    """`lens_rays` of a distorted lens, with their spatial indices."""
     return _ray_table(camera.intrinsics.model_dump_json(), 1, (0, 0, camera.width, camera.height))
 
 
 @dataclass(frozen=True, eq=False)
 class RayTable:
-    """Rays of a lens, and the indices over them that `kernels_rays` builds."""
+    """Rays of a lens, and the spatial indices that `kernels_rays` builds for them."""
 
     rays: NDArray[np.float64]
     levels: NDArray[np.int64]
@@ -275,12 +278,13 @@ class RayTable:
 
     @property
     def arrays(self) -> tuple[NDArray[Any], ...]:
-        """(rays, levels, boxes, cells), as the kernels take them."""
+        """(rays, levels, boxes, cells), in the form that the kernels take."""
         return self.rays, self.levels, self.boxes, self.cells
 
 
 def _canvas(camera: Camera, window: Window) -> Window:
-    """The rectangle of pixels to tabulate for this window: one of few, so that a table serves many windows and frames."""
+    """The rectangle of pixels to tabulate for this window, chosen from a few, so that a table serves many windows and frames.
+    """
     w, h = camera.width, camera.height
     image, around = (0, 0, w, h), (-w, -h, 2 * w, 2 * h)
     if _within(window, image):
@@ -294,13 +298,13 @@ def _within(a: Window, b: Window) -> bool:
 
 @lru_cache(maxsize=4)
 def _ray_table(lens: str, samples: int, canvas: Window) -> RayTable:
-    """The table for the intrinsics with this JSON, `samples` x `samples` rays for each pixel of the canvas."""
+    """The table for the intrinsics in this JSON, with `samples` x `samples` rays for each pixel of the canvas."""
     intrinsics = Intrinsics.model_validate_json(lens)
     return index_rays(intrinsics, pixel_rays(intrinsics, samples, canvas), samples)
 
 
 def index_rays(intrinsics: Intrinsics, rays: NDArray[np.float64], samples: int) -> RayTable:
-    """The ray table of a distorted lens with its indices: rays (H, W, 3), `samples` x `samples` of them a pixel."""
+    """The ray table of a distorted lens with its spatial indices: rays (H, W, 3), `samples` x `samples` of them per pixel."""
     from viewsphere.truth.raster import kernels_rays as kernels
 
     rays.setflags(write=False)
@@ -320,10 +324,10 @@ def _draw(
     q: NDArray[np.float64],
     shown: tuple[NDArray[np.float64], NDArray[np.int32]] | None = None,
 ) -> tuple[NDArray[np.float64], NDArray[np.int32]]:
-    """Draw a part's triangles, whose vertices are `homogeneous` in q, over the window: 1/s (0 where none) and triangle (-1
-    where none).
+    """Draw a part's triangles, whose vertices are `homogeneous` in q, over the window: 1/s (0 if none) and triangle (-1 if
+    none).
 
-    The triangles are drawn into the arrays `shown` already, if these are given.
+    If the arrays `shown` are given, the triangles are drawn into them.
     """
     from viewsphere.truth.raster import kernels_draw as kernels
     from viewsphere.truth.raster import kernels_rays

@@ -1,1 +1,1 @@
-"""Points that stay on surfaces: where pictures show them."""
+"""Points that stay on surfaces, and their places in pictures."""

@@ -1,4 +1,4 @@
-"""Points on triangles by their barycentrics, and the rays of a lens through any positions of its picture."""
+"""Points on triangles by their barycentrics, and the rays of a lens through arbitrary positions of its picture."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ Whole = NDArray[np.int32]
 
 
 def rays_through(view: View, xy: Float) -> Float:
-    """Rays (N, 3) through positions (N, 2): (x, y, 1) for a pinhole, else as `geometry.camera.pixel_rays`."""
+    """Rays (N, 3) through positions (N, 2): (x, y, 1) for a pinhole, otherwise as in `geometry.camera.pixel_rays`."""
     lens = view.camera.lens
     return np.column_stack((xy, np.ones(len(xy)))) if lens.is_linear else lens.rays(xy).directions
 
@@ -28,7 +28,7 @@ def weights_of(view: View, triangle: Whole, rays: Float) -> Float:
 
 
 def stick(geometry: Geometry, triangle: Whole, weights: Float, out: Float) -> Float:
-    """Write where points (N, 3) of these triangles (N,) are in the world, leaving those of triangle -1; returns `out`."""
+    """Write the world places of points (N, 3) on these triangles (N,), skipping points of triangle -1; returns `out`."""
     from viewsphere.truth.surface_points import kernels_attached as kernels
 
     kernels.stick(geometry.corners(triangle), triangle, weights, out)

@@ -16,13 +16,13 @@ Drawn = tuple[NDArray[np.int64], Float]
 """Triangles (n,) and barycentrics (n, 3) of points."""
 
 ROUNDS = 100
-"""Most rounds of drawing points until enough lie on surface rather than in gaps of cut-outs."""
+"""Maximum number of rounds of drawing points until enough are on surface rather than in gaps of cut-outs."""
 
 
 def points_on(view: View, count: int, rng: np.random.Generator, things: Sequence[int] | None = None) -> SurfacePoints:
-    """Points drawn evenly, by area, on the surfaces of a view's things, by default of all objects that are there.
+    """Points drawn uniformly, by area, on the surfaces of a view's things; by default, on all objects that are present.
 
-    Raises ValueError where these have no surface, or next to none.
+    Raises ValueError if these have no surface, or almost none.
     """
     triangles = _triangles(view, range(view.geometry.object_count) if things is None else things)
     picked, weights = _evenly(view, triangles, view.geometry.vertices, count, rng)
@@ -35,8 +35,8 @@ def points_on(view: View, count: int, rng: np.random.Generator, things: Sequence
 
 
 def points_on_model(view: View, i: int, count: int) -> Drawn:
-    """Points drawn evenly, by area in its own axes, on the model of thing i: wherever it stands, and on all instances, the
-    same. Triangles are counted from the thing's first. None where it has no surface, or next to none.
+    """Points drawn uniformly on the model of thing i, by area in its own axes: the same at any pose, and on all instances.
+    Triangle numbers count from the thing's first. None if it has no surface, or almost none.
     """
     triangles = _triangles(view, [i])
     picked, weights = _evenly(view, triangles, view.geometry.coordinates, count, np.random.default_rng(0))
@@ -56,7 +56,8 @@ def _triangles(view: View, things: Sequence[int]) -> NDArray[np.int64]:
 def _evenly(
     view: View, triangles: NDArray[np.int64], places: NDArray[np.floating], count: int, rng: np.random.Generator
 ) -> Drawn:
-    """So many points on triangles whose vertices are at these places; fewer where they have no surface, or next to none."""
+    """`count` points on triangles whose vertices are at these places; fewer if the triangles have no surface, or almost none.
+    """
     picked, weights = np.zeros(0, np.int64), np.zeros((0, 3))
     corners = places[view.geometry.triangles[triangles]].astype(np.float64)
     x, y, z = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]).T
@@ -74,7 +75,7 @@ def _evenly(
 
 
 def _drawn(triangles: NDArray[np.int64], total: Float, count: int, rng: np.random.Generator) -> Drawn:
-    """Points on triangles of these areas, summed up (Turk 1990, "Generating random points in triangles")."""
+    """Points on triangles with these cumulative areas (Turk 1990, "Generating random points in triangles")."""
     at = np.searchsorted(total, rng.random(count) * total[-1], side="right")
     root, share = np.sqrt(rng.random(count)), rng.random(count)
     weights = np.column_stack((1.0 - root, root * (1.0 - share), root * share))

@@ -1,4 +1,4 @@
-"""Points that stick to triangles: their barycentrics, and where these are when the corners are elsewhere."""
+"""Points attached to triangles: their barycentrics, and their places after the corners have moved."""
 
 from __future__ import annotations
 
@@ -23,8 +23,8 @@ def weights(triangles, chosen, q, rays, out):
 
 @njit
 def stick(corners, chosen, barycentrics, out):
-    """Write the points (N, 3) that have these barycentrics (N, 3) in triangles of these corners (N, 3, 3); none where the
-    triangle `chosen` (N,) is -1.
+    """Write the points (N, 3) that have these barycentrics (N, 3) in triangles with these corners (N, 3, 3), skipping points
+    whose triangle `chosen` (N,) is -1.
     """
     for i in range(chosen.shape[0]):
         ui = np.uintp(i)

@@ -1,8 +1,9 @@
-"""The triangle that each point of a picture meets first: a raster whose samples are arbitrary points.
+"""The triangle that each point of a picture meets first: a rasteriser whose samples are arbitrary points.
 
-The points are sorted by pixel, so those of a row's neighbouring pixels are one run; each triangle is tested against the runs
-that its box touches. The test is exact for any point, so points of more pixels than needed do no harm. Known as the irregular
-z-buffer (Johnson et al. 2005; Aila and Laine 2004, "Alias-free shadow maps"). Edges and planes are those of `kernels_draw`.
+The points are sorted by pixel, so the points of neighbouring pixels in a row form one run; each triangle is tested against the
+runs that its box touches. The test is exact for any point, so testing points of extra pixels is harmless. This is known as the
+irregular z-buffer (Johnson et al. 2005; Aila and Laine 2004, "Alias-free shadow maps"). Edges and planes are computed by
+`kernels_draw`.
 """
 
 from __future__ import annotations
@@ -27,14 +28,14 @@ from viewsphere.truth.raster.kernels_draw import (
 from viewsphere.truth.raster.kernels_row import meet_four
 
 WIDER = 1e-6  # pixels by which a triangle's box is widened: more than the rounding of its corners and of the edge functions
-SMALL = 8  # pixels: up to this width all points of a box are tested, and looked at beforehand if its height is no more
+SMALL = 8  # pixels: up to this width all points of a box are tested, after a first check if its height is no more
 A, B, C, D = np.uintp(0), np.uintp(1), np.uintp(2), np.uintp(3)
 
 
 @njit
 def boxes(q, endless, width, height, box):
-    """Range of pixels of each vertex, (n, 4) int32: x, y of the first, -x, -y of the last, as `kernels_draw.cells` has it, but
-    of whole pixels; BEHIND where w <= 0, and for the vertices from `endless` on.
+    """Range of pixels of each vertex, (n, 4) int32: x, y of the first, -x, -y of the last, as in `kernels_draw.cells`, but for
+    whole pixels. It is BEHIND if w <= 0, and for the vertices from `endless` on.
     """
     for i in range(q.shape[0]):
         ui = np.uintp(i)
@@ -50,8 +51,8 @@ def boxes(q, endless, width, height, box):
 
 @njit
 def cover(box, starts, width, height, covered):
-    """Fill covered (pixels,) with whether a pixel lies in the box of any of the meshes, whose vertices begin at `starts`, the
-    last of which is the ground's; `box` as `boxes` fills it.
+    """Fill covered (pixels,) with whether a pixel is in the box of any mesh. Vertices of the meshes begin at `starts`, whose
+    last entry is the ground's; `box` is filled by `boxes`.
     """
     covered[:] = False
     for i in range(starts.shape[0] - 1):
@@ -66,13 +67,14 @@ def cover(box, starts, width, height, covered):
 
 @njit
 def sort(xy, near, gap, own, cell, covered, ground, clear, start, order, points, nearest, number, far):
-    """Sort the points xy (N, 2) by their pixels, `cell` (N,), leaving out those of -1; returns how many are left.
+    """Sort the points xy (N, 2) by their pixels, `cell` (N,), leaving out those of -1; return the number of remaining points.
 
-    Those are left out, too, that only a mesh could hide, their `own` triangles from `clear` on, where none is: see `cover`.
-    Point order[p] is at points[:, p]; its `own` triangle is in number[p], `ground` for all of the ground's, and `near` times
-    `gap`, the 1/z to be exceeded, in nearest[p]. Pixel i has the points [start[i], start[i + 1]), and far[i] is the least of
-    their `nearest`. start: (pixels + 2,). Behind the sorted points are FOUR that meet nothing: `points`, `nearest` and `number`
-    have room for so many more.
+    Points whose `own` triangle number is at least `clear` can only be hidden by a mesh. They are left out if no mesh covers
+    their pixel: see `cover`.
+    Point order[p] is at points[:, p]; its `own` triangle is in number[p], `ground` for all of the ground's. nearest[p] is
+    `near` times `gap`, the 1/z to be exceeded. Pixel i has the points [start[i], start[i + 1]), and far[i] is the minimum of
+    their `nearest`. start: (pixels + 2,). After the sorted points there are FOUR dummies that meet nothing: `points`, `nearest`
+    and `number` have room for them.
     """
     start[:] = 0
     for k in range(cell.shape[0]):
@@ -104,9 +106,9 @@ def sort(xy, near, gap, own, cell, covered, ground, clear, start, order, points,
 def meet(q, box, triangles, ground, cutout, alpha_masks, size, start, points, nearest, met, number, far):
     """Write the first triangle that each sorted point meets into `met`, and its 1/z into `nearest`.
 
-    A triangle is met if it is nearer than 1/z = `nearest` by more than a factor NEARER, and is not the point's own: `number`;
-    those from `ground` on are one. far: (height, width), as `sort` fills it. `points`, `nearest`, `met` and `number` have 3
-    entries more than there are points.
+    A triangle is met if it is nearer than 1/z = `nearest` by more than a factor NEARER, and is not the point's own triangle
+    (`number`); triangles from `ground` on count as one. far: (height, width), as `sort` fills it. `points`, `nearest`, `met`
+    and `number` have 3 entries more than there are points.
     """
     width, height = size
     us, vs = points[0], points[1]
@@ -150,7 +152,7 @@ def meet(q, box, triangles, ground, cutout, alpha_masks, size, start, points, ne
 def _run(e0, e1, e2, y, xa, xb, width, start):
     """The points, from first to before last, in the pixels of a row that a triangle may touch, between columns xa and xb.
 
-    An edge function is greatest at one end of the row's height, sums and products being monotone in floating point too.
+    An edge function is greatest at one end of the row's height, because sums and products are monotone in floating point too.
     """
     low, high = float(xa), xb + 1.0
     if xb - xa >= SMALL:
@@ -171,7 +173,9 @@ def _run(e0, e1, e2, y, xa, xb, width, start):
 
 @inner
 def _meet_checked(t, own, q0, q1, q2, area, width, bounds, cutout, alpha_masks, start, points, nearest, met, number):
-    """`meet` for a cut-out, or a sliver whose facing is uncertain: either sign will do, 1/z stays within `bounds`."""
+    """The `meet` of a cut-out, or of a sliver with uncertain facing: either sign passes the test, and 1/z is clamped to
+    `bounds`.
+    """
     nx, ny, nz, det = plane(q0, q1, q2)
     a, b, c = edge(q1, q2), edge(q2, q0), edge(q0, q1)
     for y in range(area[1], area[3] + 1):
@@ -189,10 +193,10 @@ def _meet_checked(t, own, q0, q1, q2, area, width, bounds, cutout, alpha_masks, 
 
 @njit
 def classify(xy, near, width, height, state, cell):
-    """Fill state (N,): 4 where `near` is NaN, else 3 where xy (2 N,) is, 2 outside of the picture, 0 inside; and cell (N,)
-    int32: the pixel of what is inside, counted row by row, else -1.
+    """Fill state (N,): 4 if `near` is NaN, otherwise 3 if xy (2 N,) is NaN, 2 outside the picture, 0 inside. Also fill cell
+    (N,) int32: the pixel of a point inside, counted row by row, otherwise -1.
 
-    Without branches and with flat arrays, of which compilers make vectors.
+    The arrays are flat and the loop has no branches, so that compilers vectorise it.
     """
     for i in range(near.shape[0]):
         x, y = xy[np.uintp(2 * i)], xy[np.uintp(2 * i + 1)]
@@ -205,7 +209,7 @@ def classify(xy, near, width, height, state, cell):
 
 @njit
 def hide(met, order, occluded, state):
-    """state[order[p]] = occluded where a sorted point met a triangle."""
+    """Set state[order[p]] = occluded for each sorted point that met a triangle."""
     for p in range(order.shape[0]):
         up = np.uintp(p)
         if met[up] >= 0:
@@ -214,7 +218,7 @@ def hide(met, order, occluded, state):
 
 @njit
 def mark(met, order, triangle):
-    """triangle[order[p]] = met[p] where a sorted point met one."""
+    """Set triangle[order[p]] = met[p] for each sorted point that met a triangle."""
     for p in range(order.shape[0]):
         up = np.uintp(p)
         if met[up] >= 0:

@@ -1,4 +1,4 @@
-"""Points that keep their place on what they lie on, wherever it goes: for tracks."""
+"""Points that stay attached to the surface below them while it moves: for tracks."""
 
 from __future__ import annotations
 
@@ -19,17 +19,17 @@ Float = NDArray[np.float64]
 Whole = NDArray[np.int32]
 
 GROUND, SKY, FREE, NOWHERE = -1, -2, -3, -4
-"""Places of points on no thing: the ground, the sky, empty space, a flat picture."""
+"""The `body` of points on no thing: the ground, the sky, empty space, a flat picture."""
 
 
 @dataclass(frozen=True, eq=False)
 class SurfacePoints:
     """N points, each on a triangle of a thing, or else fixed in the world.
 
-    body (N,) int32: position in `bodies`, else GROUND, SKY, FREE or NOWHERE. triangle (N,) int32 within the body, -1 without
-    one; weights (N, 3) float64: barycentrics. place (N, 3) float64, without a triangle: a point of the world, of the sky a unit
-    vector towards it. bodies: the things as they were when points were put on them, one more than once where its triangles had
-    changed; ground_z: the ground's height then.
+    body (N,) int32: position in `bodies`, otherwise GROUND, SKY, FREE or NOWHERE. triangle (N,) int32 within the body, -1
+    without one; weights (N, 3) float64: barycentrics. place (N, 3) float64, for points without a triangle: a point of the
+    world, or for the sky a unit vector towards it. bodies: the things at the time when points were attached to them; a thing
+    whose triangles changed is listed more than once. ground_z: the ground's height at that time.
     """
 
     body: Whole
@@ -41,7 +41,9 @@ class SurfacePoints:
 
     @staticmethod
     def of(view: View, thing: Whole, triangle: Whole, weights: Float, place: Float) -> SurfacePoints:
-        """Points on things as a view has them: thing (N,) int32 is the position in its `things`, or as `body` where on none."""
+        """Points on a view's things: thing (N,) int32 is the position in its `things`, or a value as in `body` for points on no
+        thing.
+        """
         bodies = view.bodies(thing)
         number = np.searchsorted([body.position for body in bodies], thing)
         body = np.where(thing >= 0, number, thing).astype(np.int32)
@@ -52,7 +54,7 @@ class SurfacePoints:
 
     @property
     def thing(self) -> Whole:
-        """The things that they lie on, (N,) int32: positions in the view's `things`, else as `body`."""
+        """The things under the points, (N,) int32: positions in the view's `things`, otherwise as in `body`."""
         position = np.array([*(body.position for body in self.bodies), -1], np.int32)
         return np.where(self.body >= 0, position[np.maximum(self.body, -1)], self.body)
 
@@ -61,7 +63,7 @@ class SurfacePoints:
         return Tracked(self, view)
 
     def chosen(self, index: NDArray[np.intp]) -> SurfacePoints:
-        """Some of the points, by their numbers."""
+        """A selection of the points, by their numbers."""
         parts = (self.body[index], self.triangle[index], self.weights[index], self.place[index])
         return SurfacePoints(*parts, self.bodies, self.ground_z)
 
@@ -80,7 +82,7 @@ class SurfacePoints:
 
 
 def _number(body: Body, known: list[Body]) -> int:
-    """The position of a body of the same triangles among those that are known, to which it is added if there is none."""
+    """The position of a body with the same triangles in the list `known`, to which it is appended if there is none."""
     for number, other in enumerate(known):
         if other.position == body.position and other.has_triangles_of(body):
             return number
@@ -89,9 +91,10 @@ def _number(body: Body, known: list[Body]) -> int:
 
 
 def points_seen(view: View, xy: ArrayLike) -> SurfacePoints:
-    """The points that a view shows at positions (N, 2) of its picture, in pixels: what the ray through each meets first.
+    """The points that a view shows at positions (N, 2) of its picture, in pixels: the first surface that the ray through each
+    one meets.
 
-    NOWHERE outside of the picture, and where the lens has no ray or a flat picture is seen.
+    Points are NOWHERE outside the picture, if the lens has no ray, or if a flat picture is visible.
     """
     xy = np.ascontiguousarray(xy, np.float64).reshape(-1, 2)
     inside = ((xy >= 0.0) & (xy < (view.camera.width, view.camera.height))).all(axis=1)
@@ -113,7 +116,9 @@ def points_seen(view: View, xy: ArrayLike) -> SurfacePoints:
 
 
 def _fixed(view: View, thing: Whole, directions: Float) -> Float:
-    """Return the places where rays in these directions (N, 3) meet the ground, and directions of the sky; 0 for all else."""
+    """Return the places where rays with these directions (N, 3) meet the ground, and the directions of sky points; 0 for all
+    others.
+    """
     place = np.zeros(directions.shape)
     sky, ground = thing == SKY, thing == GROUND
     place[sky] = directions[sky] / np.sqrt((directions[sky] ** 2).sum(axis=1, keepdims=True))
@@ -126,7 +131,7 @@ def _fixed(view: View, thing: Whole, directions: Float) -> Float:
 
 
 def points_in_world(places: ArrayLike) -> SurfacePoints:
-    """Points (N, 3) of the world, metres, that stick to nothing."""
+    """Points (N, 3) fixed in the world, in metres."""
     place = np.ascontiguousarray(places, np.float64).reshape(-1, 3)
     nothing = np.full(len(place), -1, np.int32)
     return SurfacePoints(np.full(len(place), FREE, np.int32), nothing, np.zeros((len(place), 3)), place, (), None)
@@ -141,12 +146,12 @@ class Tracked:
 
     @property
     def xy(self) -> Float:
-        """Pixels, (N, 2), NaN where there are none."""
+        """Positions in pixels, (N, 2), NaN if there is none."""
         return self.placed.xy
 
     @cached_property
     def world(self) -> Float:
-        """The places of the points, (N, 3) metres; NaN for the sky, and for points that are nowhere."""
+        """The places of the points, (N, 3) metres; NaN for the sky, and for points that do not exist."""
         points = self.points
         fixed = (points.body == FREE) | ((points.body == GROUND) & self._has_ground)
         out = np.where(fixed[:, None], points.place, np.nan)
@@ -154,19 +159,19 @@ class Tracked:
 
     @cached_property
     def xyz(self) -> Float:
-        """The same in the camera's axes, (N, 3); of the sky (NaN, NaN, inf)."""
+        """The places in the camera's axes, (N, 3); (NaN, NaN, inf) for the sky."""
         out = transform(self.view.camera.R, self.world) + self.view.camera.t
         out[self._is_sky & in_lens(self.xy), 2] = np.inf
         return out
 
     @cached_property
     def state(self) -> NDArray[np.uint8]:
-        """The points' states, (N,) uint8, see `surface_points.raster`; `states` computes several at once."""
+        """The points' states, (N,) uint8; see `surface_points.raster`. Its `states` computes several at once."""
         return states([self.placed])[0]
 
     @cached_property
     def placed(self) -> Placed:
-        """The points as `surface_points.raster.states` takes them."""
+        """The points in the form that `surface_points.raster.states` takes."""
         own = self._own
         ground = self.view.geometry.triangle_start[-1]
         on = np.where(self.points.body == GROUND, np.int32(ground), own) if self._has_ground else own
@@ -189,12 +194,12 @@ class Tracked:
 
     @property
     def _has_ground(self) -> bool:
-        """Return whether the ground is where the points found it."""
+        """Return whether the ground is still at the height at which the points were attached."""
         return self.points.ground_z is not None and self.points.ground_z == self.view.geometry.ground_z
 
     @cached_property
     def _own(self) -> Whole:
-        """The view's triangle of each point, -1 where it has none."""
+        """The view's triangle of each point, -1 if it has none."""
         view, start = self.view, np.full(len(self.points.bodies) + 1, -1, np.int32)
         for number, body in enumerate(self.points.bodies):
             if body.position < len(view.things) and body.has_triangles_of(view.body(body.position)):

@@ -1,6 +1,6 @@
-"""The triangle of a view that each point meets first, and so the points that are hidden: exact, for any lens.
+"""The triangle of a view that each point meets first, and so the hidden points: exact, for any lens.
 
-A distorted lens' points are sorted by pinholes at the lens's place: one that sees all, or the six sides of a cube.
+The points of a distorted lens are sorted by pinholes at the same place: one that shows all points, or the six sides of a cube.
 """
 
 from __future__ import annotations
@@ -24,27 +24,27 @@ Whole = NDArray[np.int32]
 VISIBLE, OCCLUDED, OUTSIDE, BEHIND, INVALID = range(5)
 """States of a point in a view; later ones take precedence.
 
-INVALID: it is nowhere (its thing is not there or has other triangles, a flat picture). BEHIND: behind the camera, or the lens
-has no pixel for its direction. OUTSIDE: not in [0, W) x [0, H). OCCLUDED: the segment from the camera's centre to the point
-meets surface other than its own triangle, nearer by more than `GAP` of its depth; or its own triangle is single-sided and
-turns its back to the camera.
+INVALID: it does not exist (its thing is absent or has other triangles, or it is on a flat picture). BEHIND: it is behind the
+camera, or the lens has no pixel for its direction. OUTSIDE: it is not in [0, W) x [0, H). OCCLUDED: the segment from the
+camera's centre to the point meets a triangle other than its own, nearer by more than `GAP` of its depth; or its own triangle is
+single-sided and faces away from the camera.
 """
 
-GAP = 1e-6  # of the depth: above the rounding of one depth computed twice, below the gap of surfaces. Not measured alone
+GAP = 1e-6  # share of the depth: above the rounding of one depth computed twice, below the gap of surfaces. Not measured alone
 FACES = ((0, 1, 2, 1.0), (0, 1, 2, -1.0), (1, 2, 0, 1.0), (1, 2, 0, -1.0), (2, 0, 1, 1.0), (2, 0, 1, -1.0))
-"""Sides of the cube around a fisheye or a scan: the axes that are right and down in it, the axis it faces, and which way."""
+"""Sides of the cube around a fisheye or a scan: the axes for right and down, the axis that the side faces, and its sign."""
 
-LARGEST_SIDE = 1024  # pixels of a side of the cube
+LARGEST_SIDE = 1024  # pixels along a side of the cube
 
 
 @dataclass(frozen=True, eq=False)
 class Placed:
     """Points in a view, in arrays of any one shape.
 
-    xy (..., 2) float64 pixels, NaN where the lens has none; near (...) float64: 1/s, s as `raster.visibility.Visibility` has
-    it, 0 of what is infinitely far and of what has no pixel, NaN of what is nowhere. rays (..., 3) in camera axes, so that the
-    point is ray / near: None for a pinhole, which needs none. `own` gives (...) int32: the view's triangle that the point is
-    on, -1 for none; the ground's are one.
+    xy (..., 2) float64 pixels, NaN if the lens has none. near (...) float64: 1/s, with s as in `raster.visibility.Visibility`;
+    0 for points at infinity and for points without a pixel, NaN for points that do not exist. rays (..., 3) in camera axes, so
+    that the point is ray / near: None for a pinhole, which needs none. `own` gives (...) int32: the view's triangle under the
+    point, -1 for none; the ground's triangles count as one.
     """
 
     view: View
@@ -55,17 +55,17 @@ class Placed:
 
 
 def in_lens(xy: Float) -> NDArray[np.bool_]:
-    """Return whether the lens has pixels for points: their pixels (..., 2) as `Placed` has them."""
+    """Return a mask of the points that have pixels in the lens, given their pixels (..., 2) as in `Placed`."""
     return ~np.isnan(xy[..., 0])
 
 
 def placed_at(view: View, points: Float, own: Callable[[], Whole]) -> Placed:
-    """Points (N, 3) in a view's camera axes, none of which is at infinity."""
+    """Points (N, 3) in a view's camera axes, none of them at infinity."""
     return Placed(view, *pixels_at(view, points), own)
 
 
 def pixels_at(view: View, points: Float) -> tuple[Float, Float, Float | None]:
-    """Return the places of the same points in the view's picture: xy, near and rays as in `Placed`."""
+    """The positions of these points in the view's picture: xy, near and rays as in `Placed`."""
     xy, _ = project(view.camera.intrinsics, points)
     if view.has_unit_rays:
         x, y, z = points.T
@@ -77,7 +77,7 @@ def pixels_at(view: View, points: Float) -> tuple[Float, Float, Float | None]:
 
 
 def states(placed: Sequence[Placed]) -> list[NDArray[np.uint8]]:
-    """The state of each of the points, (...) uint8 each, all of which are in one view, whose triangles are drawn once."""
+    """The states (...) uint8 of each set of points. All sets are in one view, so its triangles are drawn once."""
     from viewsphere.truth.surface_points import kernels_points as kernels
 
     view = placed[0].view
@@ -97,7 +97,7 @@ def states(placed: Sequence[Placed]) -> list[NDArray[np.uint8]]:
 
 
 def _classified(xy: Float, near: Float, size: tuple[int, int]) -> tuple[NDArray[np.uint8], Whole]:
-    """The states of points by their places alone, and the pixels that they are in, see `kernels_points.classify`."""
+    """The states of points that follow from their places alone, and their pixels; see `kernels_points.classify`."""
     from viewsphere.truth.surface_points import kernels_points as kernels
 
     state, cell = np.empty(len(near), np.uint8), np.empty(len(near), np.int32)
@@ -119,8 +119,8 @@ def first_met(
 ) -> Whole:
     """The triangle that the ray to each point meets first before the point, (N,) int32, -1 where it meets none.
 
-    Points are as in `Placed`. Of those at `near` 0 whatever is in front counts. Those that are not `chosen`, by default all, or
-    do not lie in the picture, meet nothing.
+    Points are as in `Placed`. For points at `near` 0, any triangle in front counts. Points that are not `chosen` (by default
+    all are), or are not in the picture, meet nothing.
     """
     from viewsphere.truth.surface_points import kernels_points as kernels
 
@@ -151,7 +151,7 @@ def _meetings(view: View, xy: Float, near: Float, own: Whole, cell: Whole, rays:
 def _meet(
     view: View, q: Float, box: Whole, size: tuple[int, int], xy: Float, near: Float, own: Whole, cell: Whole
 ) -> tuple[Whole, Whole]:
-    """The same for a pinhole of this size; q: `homogeneous` vertices of that pinhole, box: their pixels (`pixels_of`)."""
+    """`_meetings` for a pinhole of this size; q: `homogeneous` vertices of that pinhole, box: their pixels (`pixels_of`)."""
     from viewsphere.truth.surface_points import kernels_points as kernels
 
     geometry, (width, height) = view.geometry, size
@@ -170,8 +170,8 @@ def _meet(
 
 
 def _pinholes(view: View, rays: Float, near: Float) -> Iterator[tuple[Float, tuple[int, int], NDArray[np.intp], Float, Float]]:
-    """Pinholes that together show all points of a distorted lens: the vertices as each one projects them, its size, the points
-    that it shows, their pixels and their 1/z there.
+    """Pinholes that together show all points of a distorted lens: the vertices projected by each one, its size, the points that
+    it shows, their pixels and their 1/z in it.
     """
     side = 1.0
     if view.has_unit_rays:

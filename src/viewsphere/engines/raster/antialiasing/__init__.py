@@ -1,1 +1,1 @@
-"""Samples along edges and finer pictures."""
+"""Samples along edges, and larger pictures for supersampling."""

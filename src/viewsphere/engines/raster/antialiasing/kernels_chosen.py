@@ -19,10 +19,10 @@ from viewsphere.kernels.lanes import LANES, Lanes, Rows, lanewise, size, store
 f4 = nb.float32
 U = nb.uintp
 BYTES = ir.VectorType(ir.IntType(8), LANES)
-ALIKE = 0.94  # cosine of the greatest angle, 20 degrees, between the planes of two pixels that pass for one surface
+ALIKE = 0.94  # cosine of the greatest angle, 20 degrees, between the planes of two pixels that count as one surface
 LEVEL = 1.01  # greatest ratio of such a surface's depths in neighbouring pixels
 VISIBLE = f4(0.05)  # relative difference of radiance: about five steps of 8 bits
-SHARP = f4(0.2)  # the same within glass: such steps are borders of what it bends, finer than textures behind it
+SHARP = f4(0.2)  # likewise within glass: such steps are borders of refracted things, finer than textures behind the glass
 DARK = f4(0.02)  # radiance below which differences are compared with this radiance
 TILE = 8  # pixels of a tile's side
 CLOSED = np.int32(2**31 - 1)
@@ -30,12 +30,12 @@ CLOSED = np.int32(2**31 - 1)
 
 @njit
 def compare(triangle, depth, owner, normals, room, owners, beside, above):
-    """Set in beside, above (H * W + 8,) uint8 where a pixel shows another surface than its neighbour to the left (column 0 is
-    arbitrary), and than its neighbour above (from the second row on).
+    """Set flags in beside, above (H * W + 8,) uint8 for each pixel that shows another surface than its left neighbour (column 0
+    is arbitrary), or than its neighbour above (from the second row on).
 
-    owner (T,) int32: equal where neighbouring triangles look alike; normals (T, 3). room (8, W + 16) float32 and owners
-    (4, W + 16) int32 hold what this row and the last one show: normals (arbitrary where nothing is shown) and depth, owner (-1
-    where nothing is shown) and triangle.
+    owner (T,) int32: equal for neighbouring triangles that look alike; normals (T, 3). room (8, W + 16) float32 and owners (4,
+    W + 16) int32 hold the data of this row and the previous one: normals (arbitrary if nothing is visible) and depth, owner (-1
+    if nothing is visible) and triangle.
     """
     height, width = triangle.shape
     a, b, c, d, eight = U(0), U(1), U(2), U(3), U(8)
@@ -57,7 +57,7 @@ def compare(triangle, depth, owner, normals, room, owners, beside, above):
 
 @lanewise
 def _differ(reals: Rows, p: Any, q: Any, wholes: Rows, k: Any, m: Any, stride: Any, flags: Rows, at: Any) -> None:
-    """Flag the pixels whose data `compare` has put at p and k, if they show another surface than the pixels at q and m.
+    """Flag the pixels whose data `compare` has stored at p and k, if they show another surface than the pixels at q and m.
 
     The surface is the same if owners are equal, and planes and depths differ by less than ALIKE and LEVEL allow.
     """
@@ -74,7 +74,7 @@ def _differ(reals: Rows, p: Any, q: Any, wholes: Rows, k: Any, m: Any, stride: A
 @njit
 def compare_behind(slots, behind, behind_depth, triangle, depth, owner, normals, radiance, marks):
     """Mark in marks (H * W,) pairs of neighbours, at least one in `slots`, that look alike in front but differ in a layer
-    behind and in colour: where colours are equal, hardly anything shows of that layer.
+    behind and in colour. If the colours are equal, that layer is hardly visible.
 
     behind, behind_depth (H * W,): triangle and depth of each pixel in this layer; triangle, depth (H, W): those in front;
     radiance (H * W, 4).
@@ -109,7 +109,7 @@ def compare_bent(bent, radiance, marks):
 
 @inner
 def _is_step(radiance, p, q, least):
-    """Return whether two pixels' colours or alphas differ by more than this share of the greater."""
+    """Return whether two pixels' colours or alphas differ by more than this share of the greater one."""
     differs = False
     for c in range(U(4)):
         one, other = radiance[p, c], radiance[q, c]
@@ -119,7 +119,7 @@ def _is_step(radiance, p, q, least):
 
 @inner
 def _passes(t, s, depth, other, owner, normals):
-    """Return whether two pixels pass for the same surface, as in `_differ`."""
+    """Return whether two pixels count as the same surface, as in `_differ`."""
     if t == s or t < 0 or s < 0:
         return t == s
     a, b, c, t, s = U(0), U(1), U(2), U(t), U(s)
@@ -149,16 +149,16 @@ def numbered(marks):
 
 @njit
 def level(inverse):
-    """A positive 1/z as an integer of 32 bits with the same order."""
+    """A positive 1/z as a 32-bit integer with the same order."""
     return np.float32(inverse).view(np.int32)
 
 
 @njit(_nrt=True)
 def shown_farthest(triangle, depth, pixels, height, width):
-    """The `level` of the farthest surface that the points of each pixel show, (H, W) int32: 0 where a point shows nothing,
-    CLOSED where a pixel has no points.
+    """The `level` of the farthest surface that the points of each pixel show, (H, W) int32: 0 if a point shows nothing, CLOSED
+    if a pixel has no points.
 
-    triangle, depth (N, M): of the points of `pixels` (N,), or of all pixels in order if `pixels` is empty.
+    triangle, depth (N, M): for the points of `pixels` (N,), or of all pixels in order if `pixels` is empty.
     """
     farthest = np.full((height, width), CLOSED)
     flat = farthest.reshape(-1)
@@ -172,8 +172,8 @@ def shown_farthest(triangle, depth, pixels, height, width):
 
 @njit(_nrt=True)
 def tiled(farthest):
-    """The least level in each tile, and the least in each tile and its neighbours to the right, below and diagonal: those four
-    contain any box that begins in the tile and is no wider than a tile.
+    """The minimum level in each tile, and the minimum in each tile and its neighbours to the right, below and diagonal. Those
+    four contain any box that begins in the tile and is no wider than a tile.
     """
     height, width = farthest.shape
     rows, columns = height // TILE + 1, width // TILE + 1

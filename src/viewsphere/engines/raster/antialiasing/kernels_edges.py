@@ -1,9 +1,9 @@
 """Samples of edge pixels through a pinhole, for colour: only triangles that can matter are drawn, at few pixels.
 
-A pixel is numbered (`grid`, -1 elsewhere) if its centre looks different from a neighbour's, or, while drawing, if a surface
-passes between the centres and before what they show (a thin wire). A triangle can matter in three cases: a centre at or beside
-such a pixel shows it; it has a corner at or beside such a pixel that is not hidden; it has a corner anywhere that lies before
-what is shown there. `kernels_lines` marks more pixels and triangles before.
+A pixel is numbered (`grid`, -1 elsewhere) if its centre looks different from a neighbour's. While drawing, a pixel is also
+numbered if a surface passes between the centres and in front of their surfaces (a thin wire). A triangle can matter in three
+cases: a centre at or beside such a pixel shows it; it has a visible corner at or beside such a pixel; or it has a corner
+anywhere in front of the surface shown there. `kernels_lines` marks more pixels and triangles beforehand.
 """
 
 from __future__ import annotations
@@ -20,22 +20,22 @@ from viewsphere.truth.raster.kernels_draw import EPSILON, NEVER, crossing_at, ed
 
 f4 = nb.float32
 U = nb.uintp
-STEEPEST = f4(0.9)  # of 1/z: how much farther than the centres around its pixel a sample may be
-SLACK = f4(0.01)  # relative difference of 1/z at which two surfaces still pass for the same
-FLUSH = f4(1.001)  # of 1/z: a vertex in a surface that is already drawn does not count as behind it
-NARROW = 8  # pixels: up to this size every pixel of a triangle's box is looked at
-CELL = 16  # pixels: numbered pixels are found by the cell of their row that they are in
-FEW = 4  # numbered pixels in a row's cells: up to so many are tested one by one, sooner than the row's covered part is known
-THIN = 2.0  # pixels: a triangle as wide as this is seen at some pixel's centre
+STEEPEST = f4(0.9)  # share of 1/z: how much farther a sample may be than the centres around its pixel
+SLACK = f4(0.01)  # relative difference of 1/z up to which two surfaces count as the same
+FLUSH = f4(1.001)  # tolerance of 1/z: a vertex in a surface that is already drawn does not count as behind it
+NARROW = 8  # pixels: up to this size, every pixel of a triangle's box is tested
+CELL = 16  # pixels: width of the cells in a row that index numbered pixels
+FEW = 4  # numbered pixels in a row's cells: up to this many, testing each is faster than computing the covered part of the row
+THIN = 2.0  # pixels: a triangle this wide is visible at some pixel's centre
 
 
 @njit
 def begin(pixels, total, triangle, depth, grid, limit, starts, bound, nearest, seen, wanted):
-    """Number the `total` marked pixels, and mark in `wanted` (T,) also the triangles that the centres around these pixels show.
+    """Number the `total` marked pixels, and also mark in `wanted` (T,) the triangles that the centres around these pixels show.
 
-    Fills starts (H * cells a row + 1,): the first number in each `CELL`, or behind it; grid (H, W); limit (H, W): 1/z that a
-    surface must exceed to matter to a pixel; bound (n,): 1/z of the farthest surface that may show at each number, 0 where none
-    may; nearest (n, 4) float32 1/z and seen (n, 4) triangles, -1 where none is drawn yet.
+    Fill starts (H * cells a row + 1,): the first number in each `CELL`, or after it; grid (H, W); limit (H, W): the 1/z that a
+    surface must exceed to matter to a pixel; bound (n,): 1/z of the farthest surface that may be visible at each number, 0 if
+    there is none; nearest (n, 4) float32 1/z and seen (n, 4) triangles, -1 if none is drawn yet.
     """
     height, width = triangle.shape
     cells, cell = (width + CELL - 1) // CELL, U(0)
@@ -60,7 +60,9 @@ def begin(pixels, total, triangle, depth, grid, limit, starts, bound, nearest, s
 
 @njit
 def spread(pixels, count, limit, around):
-    """Lower around (H, W), a copy of limit, beside numbered pixels to their limit: small triangles there may reach them."""
+    """Lower around (H, W), a copy of limit, next to numbered pixels to the limit of these: small triangles there may reach
+    them.
+    """
     height, width = limit.shape
     for k in range(U(count)):
         y, x = pixels[k] // width, pixels[k] % width
@@ -72,8 +74,8 @@ def spread(pixels, count, limit, around):
 
 @njit
 def with_corners_before(q, triangles, runs, wanted, limit, near, others):
-    """Mark in `others` (T,) unwanted triangles that have a vertex before the limit of its pixel; `near` (V,) is scratch. `runs`
-    are those of vertices and of triangles that are looked at: `truth.raster.visibility.in_picture`.
+    """Mark in `others` (T,) unwanted triangles that have a vertex in front of the limit of its pixel; `near` (V,) is scratch.
+    `runs` are the runs of vertices and of triangles to test: `truth.raster.visibility.in_picture`.
     """
     height, width = limit.shape
     a, b, c, d = U(0), U(1), U(2), U(3)
@@ -97,8 +99,8 @@ def draw(  # noqa: PLR0912, PLR0915, one loop, whose state is not worth handing 
 ):
     """Draw these triangles at the four samples (`offsets` (2, 4)) of the `count` numbered pixels.
 
-    `room` is `samples._room`; the other arrays are those of `begin`. Raises limit of a numbered pixel to 1/z of its farthest
-    sample. Returns how many pixels are numbered in the end.
+    `room` is `samples._room`; the other arrays are those of `begin`. For a numbered pixel, limit is raised to 1/z of its
+    farthest sample. Returns the final number of numbered pixels.
     """
     height, width = triangle.shape
     found, inverse = room
@@ -185,7 +187,7 @@ def draw(  # noqa: PLR0912, PLR0915, one loop, whose state is not worth handing 
 
 @inner
 def _hits(edges, x, y, offsets, alpha_masks, cutout):
-    """At which samples of the pixel at (x, y) a triangle with a cut-out is surface: one bit for each sample."""
+    """The samples of the pixel at (x, y) at which a triangle with a cut-out is surface: one bit for each sample."""
     e0, e1, e2 = edges
     found = 0
     for i in range(U(4)):
@@ -214,11 +216,11 @@ def span(edges, y, xa, xb, lowest, highest):
 def finish(
     count, pixels, nearest, seen, bound, offsets, triangle, depth, owner, normals, behind, kept, position, shown, inverses
 ):
-    """Pixels whose samples do not all look like the centre: pixels, position, triangle, 1/z, as `samples.Samples` has them.
+    """Pixels whose samples do not all look like the centre: pixels, position, triangle, 1/z, as defined in `samples.Samples`.
 
-    Pixels marked in behind (H * W,), if `behind` is not empty, are kept, too.
-    A sample at which nothing was drawn, though all centres around show something, shows what its pixel's centre shows. The last
-    four arrays have room for all pixels; returns how many pixels there are.
+    Pixels marked in behind (H * W,), if `behind` is not empty, are also kept. If nothing was drawn at a sample, although all
+    centres around show something, the sample shows the surface at its pixel's centre. The last four arrays have room for all
+    pixels; returns the number of pixels.
     """
     width = triangle.shape[1]
     a, b, c, d = U(0), U(1), U(2), U(3)

@@ -1,6 +1,6 @@
-"""A pixel's four samples side by side in one vector of the processor, as functions that kernels call: exact, without fastmath.
+"""A pixel's four samples side by side in one vector register, as functions that kernels call: exact, without fastmath.
 
-Written as LLVM instructions, since numba makes four scalars of four numbers, and takes long to compile them.
+Written as LLVM instructions, since numba splits four numbers into four scalars, and takes long to compile them.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ _WHOLE = ir.IntType(32)
 def nearer(
     typing: Any, edges: Any, plane: Any, bounds: Any, x: Any, y: Any, offsets: Any, nearest: Any, row: Any, inverse: Any
 ) -> Any:
-    """Return the samples of the pixel at (x, y) that a triangle covers in front of nearest[row], as one bit for each sample.
+    """Return the samples of the pixel at (x, y) at which a triangle covers nearest[row], as one bit for each sample.
 
     edges: three times coefficients (a, b, c), a x + b y + c >= 0 inside; plane: coefficients of 1/z, which stays within
     `bounds`; offsets (2, 4) float64; inverse (4,) float32 is filled with 1/z at all samples.
@@ -53,7 +53,7 @@ def nearer(
 
 @intrinsic
 def put_before(typing: Any, found: Any, inverse: Any, index: Any, nearest: Any, seen: Any, row: Any) -> Any:
-    """Put `inverse` and `index` into nearest[row] and seen[row] where `found` has its bit set; returns the row's least 1/z."""
+    """Write `inverse` and `index` into nearest[row] and seen[row] for each bit set in `found`; return the row's minimum 1/z."""
     kind = nb.float32(found, inverse, index, nearest, seen, row)
 
     def code(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:

@@ -1,7 +1,7 @@
-"""Pixels in which a thin line passes between the centres, in a surface or just on it, unseen by `kernels_edges`.
+"""Pixels in which a thin line passes between the centres, in a surface or just on it, which `kernels_edges` does not find.
 
-A panel's seam is as far away as the paint beside it, so nothing lies in front of what the centres show. Candidates are narrow
-triangles that have a vertex about as far away as the surface in that vertex's pixel, and that look different from that surface.
+A panel's seam is as far away as the paint beside it, so it is not in front of the surfaces at the centres. Candidates are
+narrow triangles that look different from the surface in a vertex's pixel and have that vertex at about the same distance.
 """
 
 from __future__ import annotations
@@ -19,15 +19,16 @@ f4 = nb.float32
 U = nb.uintp
 BEFORE = f4(0.01)  # relative difference of 1/z of a vertex and its pixel's centre: nearer vertices are left to `kernels_edges`
 BEHIND = f4(0.005)  # likewise for a vertex farther than the centre: enough for steep surfaces, too
-FLUSH = 0.001  # of 1/z: how far a line may lie behind the plane of the visible surface
+FLUSH = 0.001  # share of 1/z: how far a line may be behind the plane of the visible surface
 WIDE = 8  # pixels: in wider boxes the part of each row that the triangle covers is computed first
 FOUND = 2  # in `marks`: a pixel marked by this module
-NARROW = 1.0  # pixels: a line as wide as this is seen at some centre
+NARROW = 1.0  # pixels: a line this wide is visible at some centre
 
 
 @njit
 def on_others(q, triangles, runs, cutout, owner, triangle, depth, shown, lines):
-    """Mark in `lines` (T,) triangles with a vertex on a visible surface of another owner that hides it at most a little.
+    """Mark in `lines` (T,) the triangles with a vertex on a visible surface of another owner that hides the vertex slightly or
+    not at all.
 
     shown (V,) int32 is scratch; `runs` are those of `kernels_edges.with_corners_before`.
     """
@@ -54,7 +55,7 @@ def on_others(q, triangles, runs, cutout, owner, triangle, depth, shown, lines):
 
 @njit
 def mark(order, q, triangles, owner, offsets, triangle, depth, marks, wanted):
-    """Mark pixels that have a sample on one of these triangles where it is narrow; mark such triangles in `wanted` (T,)."""
+    """Mark pixels that have a sample on a narrow part of one of these triangles; mark such triangles in `wanted` (T,)."""
     height, width = triangle.shape
     a, b, c, d = U(0), U(1), U(2), U(3)
     lowest, highest = offsets[a, d], offsets[a, b]  # the outermost samples along either axis
@@ -76,7 +77,7 @@ def mark(order, q, triangles, owner, offsets, triangle, depth, marks, wanted):
         ya = math.ceil(max(min(v0, v1, v2) - highest, 0.0))
         xb = math.floor(min(max(u0, u1, u2) - lowest, width - 1.0))
         yb = math.floor(min(max(v0, v1, v2) - lowest, height - 1.0))
-        # The shares of corners 1 and 2 at a point, counted from corner 0.
+        # The shares of corners 1 and 2 at a point, relative to corner 0.
         scale = 1.0 / area
         sx, sy, tx, ty = by * scale, -bx * scale, -ay * scale, ax * scale
         s0, t0 = -(sx * u0 + sy * v0), -(tx * u0 + ty * v0)
@@ -106,7 +107,7 @@ def mark(order, q, triangles, owner, offsets, triangle, depth, marks, wanted):
 
 @inner
 def _is_flush(inverse, px, py, t, q, triangles):
-    """Return whether 1/z `inverse` at (px, py) lies at most a little behind triangle t's plane."""
+    """Return whether 1/z `inverse` at (px, py) is at most slightly behind triangle t's plane."""
     i0, i1, i2 = triangles[t, 0], triangles[t, 1], triangles[t, 2]
     nx, ny, nz, det = plane((q[i0, 0], q[i0, 1], q[i0, 2]), (q[i1, 0], q[i1, 1], q[i1, 2]), (q[i2, 0], q[i2, 1], q[i2, 2]))
     return det != 0.0 and inverse >= (1.0 - FLUSH) * (nx * px + (ny * py + nz)) / det

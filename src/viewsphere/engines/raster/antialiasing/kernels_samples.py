@@ -1,9 +1,10 @@
-"""Exact rasterisation of a few chosen pixels, several points each: truth's algebra, bit for bit, at any point of a pixel.
+"""Exact rasterisation of a few chosen pixels with several points each: the computation is bitwise that of truth, at any point
+of a pixel.
 
 Point m of chosen pixel k (see `kernels_chosen`) is at (x, y) + `offsets`[:, m]. `nearest` (1/z of the nearest solid surface, 0
-where there is none) and `seen` (its triangle) are (K, M). `farthest` (H, W) holds, as a `level`, the 1/z that a surface must
-exceed to matter to a pixel, CLOSED for pixels that are not drawn; `tiles` holds its minimum in each tile. See-through surfaces
-are listed from near to far in `inverses` and `listed` (K, M, capacity), `counts` of them at each point.
+if there is none) and `seen` (its triangle) are (K, M). `farthest` (H, W) holds, as a `level`, the 1/z that a surface must
+exceed to matter to a pixel, and CLOSED for pixels that are not drawn. `tiles` holds its minimum in each tile. See-through
+surfaces are listed from near to far in `inverses` and `listed` (K, M, capacity), with their number at each point in `counts`.
 """
 
 from __future__ import annotations
@@ -30,9 +31,9 @@ from viewsphere.truth.raster.kernels_draw import (
 from viewsphere.truth.raster.kernels_rays import ANY_DEPTH, LEAF, NO_BOX, leaf_list, limits, pixel_box, touched
 
 U = nb.uintp
-TIE = 1e-5  # relative difference of 1/z below which two surfaces count as lying on one another
-NARROW = TILE  # pixels: up to this size every pixel of a triangle's box is looked at
-MEDIUM = 64  # pixels: up to this size every tile of a box is looked at, beyond it every row
+TIE = 1e-5  # relative difference of 1/z below which two surfaces count as coincident
+NARROW = TILE  # pixels: up to this size, every pixel of a triangle's box is tested
+MEDIUM = 64  # pixels: up to this size, every tile of a box is tested, beyond it every row
 
 
 @inner
@@ -54,8 +55,8 @@ def _box(q, i0, i1, i2, reach, width, height):
 
 @njit(_nrt=True)
 def around(q, triangles, runs, cutout, left_out, window):
-    """Triangles, int64, that may touch a window (x0, y0, x1, y1; pixels, both ends included), except those in `left_out`.
-    `runs` are those of `kernels_edges.with_corners_before`.
+    """Triangles, int64, that may touch a window (x0, y0, x1, y1; in pixels, inclusive), except those in `left_out`. `runs` are
+    those of `kernels_edges.with_corners_before`.
     """
     x0, y0, x1, y1 = window
     side = np.empty(q.shape[0], np.uint8)  # one bit for each side of the window that the vertex is beyond
@@ -79,7 +80,7 @@ def around(q, triangles, runs, cutout, left_out, window):
 
 @njit(_nrt=True)
 def touched_boxes(q, order, triangles, reach, farthest):
-    """Pixels inside these triangles' boxes that show something behind the triangle's nearest corner, (H, W) uint8."""
+    """Pixels inside these triangles' boxes that show a surface behind the triangle's nearest corner, (H, W) uint8."""
     height, width = farthest.shape
     marks = np.zeros((height, width), np.uint8)
     a, b, c, d = U(0), U(1), U(2), U(3)
@@ -188,7 +189,7 @@ def _is_hidden(tiles, xa, ya, xb, yb, most):
 
 @inner
 def _open(farthest, xa, ya, xb, yb, most, found):
-    """Pixels of the box that show something farther than `most`, as row << 16 | column."""
+    """Pixels of the box that show a surface farther than `most`, as row << 16 | column."""
     count = U(0)
     for y in range(U(ya), U(yb + 1)):
         for x in range(U(xa), U(xb + 1)):
@@ -199,7 +200,7 @@ def _open(farthest, xa, ya, xb, yb, most, found):
 
 @inner
 def _open_tiles(farthest, blocks, box, edges, most, found):
-    """As `_open`, in the tiles of the box that the triangle may touch."""
+    """The pixels of `_open`, limited to the tiles of the box that the triangle may touch."""
     xa, ya, xb, yb = box
     count = U(0)
     for row in range(ya // TILE, yb // TILE + 1):
@@ -218,13 +219,13 @@ def _open_tiles(farthest, blocks, box, edges, most, found):
 
 @inner
 def _is_outside(e, x, y):
-    """Return whether all of the tile that begins at (x, y) is outside of an edge."""
+    """Return whether the whole tile that begins at (x, y) is outside an edge."""
     return max(e[0] * x, e[0] * (x + TILE)) + (max(e[1] * y, e[1] * (y + TILE)) + e[2]) < 0.0
 
 
 @inner
 def _open_row(farthest, points, y, span, thorough, most, found):
-    """As `_open`, for a part of a row; of a long part only chosen pixels, unless `thorough`."""
+    """The pixels of `_open` for a part of a row; for a long part, only chosen pixels, unless `thorough`."""
     grid, pixels, _, _ = points
     left, right = span
     if left > right:
@@ -259,7 +260,7 @@ def _span(edges, scales, y, xa, xb, reach):
 
 @inner
 def _draw_solid(surface, edges, found, count, points, solid):
-    """Draw a solid triangle at these pixels: four points are tested at once, single points only where any is covered."""
+    """Draw a solid triangle at these pixels: four points are tested at once, single points only if any is covered."""
     grid, _, offsets, _ = points
     nearest, seen, farthest, _ = solid
     t, _, _, (nx, ny, nz, det), _ = surface
@@ -299,8 +300,7 @@ def _draw_solid(surface, edges, found, count, points, solid):
 
 @inner
 def _is_before(inverse, t, old, seen):
-    """Return whether triangle t is seen instead of triangle `seen`: truth, which draws in order, decides so by `NEARER`
-    alone.
+    """Return whether triangle t is visible instead of triangle `seen`. Truth, which draws in order, decides only by `NEARER`.
     """
     return (inverse > old * NEARER) | ((t < seen) & (inverse * NEARER >= old))
 
@@ -323,7 +323,7 @@ def _draw_checked(surface, edges, found, count, points, alpha_masks, triangles, 
 
 @inner
 def _cast(surface, edges, ray, p, alpha_masks, triangles, solid, fragments):
-    """Do for one point's ray what truth does for cut-outs and slivers; a see-through surface is listed."""
+    """Process one point's ray as truth does for cut-outs and slivers; a see-through surface is listed."""
     t, cutout, is_see_through, (nx, ny, nz, det), bounds = surface
     nearest, seen = solid[0], solid[1]
     a, b, c = edges
@@ -342,10 +342,10 @@ def _cast(surface, edges, ray, p, alpha_masks, triangles, solid, fragments):
 
 @inner
 def _insert(t, inverse, p, triangles, fragments):
-    """List a see-through surface by distance; of surfaces that lie on one another the last triangle is in front.
+    """List a see-through surface by distance; of coincident surfaces, the last triangle is in front.
 
-    Only one of two triangles that share an edge and lie on one another is listed: the point is on that edge, or one
-    is the other's back.
+    If two coincident triangles share an edge, only one is listed: the point is on that edge, or one triangle is the other's
+    back.
     """
     k, m = p
     inverses, listed, counts, q = fragments
@@ -366,7 +366,7 @@ def _insert(t, inverse, p, triangles, fragments):
 
 @inner
 def _share_edge(q, triangles, s, t):
-    """Return whether two corners of triangle s are where corners of t are."""
+    """Return whether two corners of triangle s coincide with corners of t."""
     same = 0
     for i in range(3):
         for j in range(3):
@@ -378,9 +378,10 @@ def _share_edge(q, triangles, s, t):
 
 @njit(_nrt=True)
 def draw_rays(q, order, triangles, cutout, alpha_masks, see_through, unit, table, points, solid, fragments):
-    """As `draw`, along rays: `table` is (rays, levels, boxes, cells) of `kernels_rays`, of S x S rays a pixel.
+    """The equivalent of `draw` along rays: `table` is (rays, levels, boxes, cells) of `kernels_rays`, with S x S rays per
+    pixel.
 
-    `points` is (grid, pixels, S); q is in camera axes, and `unit` says that the rays have length 1 rather than z = 1.
+    `points` is (grid, pixels, S); q is in camera axes. If `unit` is set, the rays have length 1 rather than z = 1.
     """
     rays, levels, boxes, faces = table
     leaves = leaf_list(levels)
@@ -423,7 +424,7 @@ def _is_empty(points, box):
 
 @inner
 def _cast_box(surface, edges, box, rays, alpha_masks, triangles, points, solid, fragments):
-    """Draw a triangle at the chosen pixels of a box of rays (both ends included)."""
+    """Draw a triangle at the chosen pixels of a box of rays (inclusive)."""
     grid, pixels, side = points
     height, width = grid.shape
     xa, xb = box[0] // side, min(box[2] // side, width - 1)

@@ -1,4 +1,4 @@
-"""Samples of edge pixels and layers of see-through surfaces, by rasterising only the pixels that need them."""
+"""Samples of edge pixels and layers of see-through surfaces, computed by rasterising only the pixels that need them."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from viewsphere.truth.raster.visibility import (
 )
 
 OFFSETS = ((0.375, 0.125), (0.875, 0.375), (0.625, 0.875), (0.125, 0.625))
-"""Places of the four samples in a pixel: a rotated grid, in which each row and each column of quarters holds one sample."""
+"""Positions of the four samples in a pixel: a rotated grid, in which each row and each column of quarters has one sample."""
 
 MOST_LAYERS = 8
 POINTS_AT_ONCE = 1 << 20
@@ -38,7 +38,7 @@ _ROTATED = np.array(OFFSETS).T.copy()
 _CENTER_REACH, _ROTATED_REACH = (0.5, 0.5), (0.125, 0.875)
 _NO_PIXELS = np.zeros(0, np.int32)
 NOWHERE = np.zeros(0, np.uint8)
-"""Marks of a picture in which no pixel is marked."""
+"""The marks of a picture without marked pixels."""
 
 Int32 = NDArray[np.int32]
 Float32 = NDArray[np.float32]
@@ -50,8 +50,8 @@ Marks = NDArray[np.uint8]
 class Samples:
     """Four samples of each edge pixel.
 
-    pixels (E,) int32: flat indices, each once. Then, four rows a pixel: position (4E, 2) float32 in pixels; rays (4E, 3)
-    float32, camera axes, empty for a pinhole; triangle (4E,) int32, -1 where none; inverse_depth (4E,) float32 as in
+    pixels (E,) int32: flat indices, each once. The others have four rows per pixel: position (4E, 2) float32 in pixels; rays
+    (4E, 3) float32, camera axes, empty for a pinhole; triangle (4E,) int32, -1 if none; inverse_depth (4E,) float32 as in
     `Visibility`.
     """
 
@@ -76,13 +76,12 @@ def edge_samples(
 ) -> Samples | None:
     """The pixels whose samples do not all show the surface at the centre, with their samples; None if there are none.
 
-    `visibility` is truth's buffer for this camera; owner (T,): equal where neighbouring triangles look alike. Candidates are
-    the pixels that differ from a neighbour and, with a pinhole, the pixels in which a surface passes between the centres: a
-    nearer one (thin wires), or one as far (thin lines on a surface, `kernels_lines`). Pixels marked in behind (H * W,), if
-    `behind` is not empty, are returned whatever their samples show. With a distorted lens each sample shows exactly what
-    truth's rasteriser would see there; with a pinhole nearly all samples do: a triangle that no centre around sees and that has
-    no corner in such a pixel is left out (`kernels_edges`), and the surface behind it, or the one at the centre, is shown
-    instead.
+    `visibility` is truth's buffer for this camera; owner (T,): equal for neighbouring triangles that look alike. Candidates are
+    the pixels that differ from a neighbour and, with a pinhole, the pixels in which a surface passes between the centres. This
+    surface is nearer (thin wires), or equally far (thin lines on a surface, `kernels_lines`). Pixels marked in behind (H * W,),
+    if `behind` is not empty, are always returned. With a distorted lens, each sample is exactly the result of truth's
+    rasteriser at that point. With a pinhole, nearly all samples are. A triangle is left out if no centre nearby shows it and it
+    has no corner in such a pixel (`kernels_edges`). The sample then shows the surface behind it, or the one at the centre.
     """
     q = homogeneous(geometry, camera) if visibility.corners is None else visibility.corners
     geometry = seen_from(geometry, q)
@@ -104,17 +103,17 @@ def edge_samples(
 
 
 def differs_behind(visibility: Visibility, stack: Sequence[Layer], owner: Int32, normals: Float32, radiance: Float32) -> Marks:
-    """Pixels that look like a neighbour in front, but not behind a see-through surface: marks (H * W,), empty if none is
+    """Marks (H * W,) of pixels that look like a neighbour in front, but not behind a see-through surface; empty if nothing is
     see-through.
 
-    `stack` is what `layers` gives for the pixels' centres, radiance (H * W, 4) their colours: where two pixels have equal
-    colours, nothing shows of a difference behind.
+    `stack` is the result of `layers` for the pixels' centres, and radiance (H * W, 4) has their colours: if two pixels have
+    equal colours, a difference behind is invisible.
     """
     if not stack:
         return NOWHERE
     marks = np.zeros(visibility.triangle.size, np.uint8)
     shown = visibility.triangle, visibility.inverse_depth
-    behind, depth = shown[0].flatten(), shown[1].flatten()  # where there is no solid surface, the see-through one
+    behind, depth = shown[0].flatten(), shown[1].flatten()  # the see-through surface if there is no solid one
     for i, layer in enumerate(stack):
         if i > 0:
             behind[:] = -1  # beyond the end of a see-through surface this layer is empty
@@ -136,12 +135,12 @@ def layers(
 
     The points, with the triangle that each shows (N,), are all pixels' centres in order, or the four samples of each of
     `pixels`; a slot is a point's index. see_through (T + 1,): the last entry, for triangle -1, is False; `corners` is
-    `Visibility.corners`, if known. The first layer holds the nearest solid surfaces (nothing where there is none), the second
-    the farthest see-through surface of every such point, the third the next of points that have two, up to 8; farther ones are
-    left out. Empty where nothing is see-through.
+    `Visibility.corners`, if known. The first layer has the nearest solid surfaces (nothing if there is none), the second the
+    farthest see-through surface of every such point. The third has the next surface of points with two, and so on up to 8;
+    farther surfaces are left out. The list is empty if nothing is see-through.
 
-    A see-through surface that lies on a solid one (1/z equal within 1e-5) is in front of it, and of two see-through surfaces
-    that lie on one another the later triangle is in front: decals are on top.
+    A see-through surface that coincides with a solid one (1/z equal within 1e-5) is in front of it. Of two coincident
+    see-through surfaces, the later triangle is in front: decals are on top.
     """
     if not see_through.any():
         return []
@@ -178,7 +177,7 @@ def layers(
 
 
 def _touched(points: _Points, geometry: Geometry, q: NDArray[np.float64], see_through: Bool) -> NDArray[np.intp]:
-    """Pixels of a distorted lens at whose points a see-through surface may be in front."""
+    """Pixels of a distorted lens with points at which a see-through surface may be in front."""
     points.draw(geometry, q, see_through, np.flatnonzero(see_through))
     return points.pixels[:-1][points.counts.any(axis=1)].astype(np.intp)
 
@@ -191,7 +190,9 @@ def _pile(
     clear: NDArray[np.int64],
     shown: tuple[Int32, Float32],
 ) -> None:
-    """Draw see-through surfaces before the solid ones that the points show, then the solid surfaces behind see-through ones."""
+    """Draw see-through surfaces in front of the solid ones that the points show, then the solid surfaces behind see-through
+    ones.
+    """
     is_solid = ~see_through[shown[0]] & (shown[0] >= 0)
     points.seen[:] = np.where(is_solid, shown[0], -1)
     points.nearest[:] = np.where(is_solid, shown[1], 0)
@@ -247,7 +248,7 @@ class _Points:
 
     @classmethod
     def of(cls, camera: Camera, marks: NDArray[np.uint8], count: int, capacity: int) -> _Points:
-        """The marked pixels, with `count` points each, and room for up to `capacity` see-through surfaces a point."""
+        """The marked pixels, with `count` points each, and room for up to `capacity` see-through surfaces per point."""
         grid, pixels = kernels_chosen.numbered(marks)
         n = len(pixels) - 1
         return cls(
@@ -279,7 +280,8 @@ class _Points:
 
 
 def _differs_from_neighbour(triangle: Int32, depth: Float32, owner: Int32, normals: Float32) -> NDArray[np.uint8]:
-    """Pixels that look different from the one beside, above or below: uint8, in order, padded to whole words of 8 bytes."""
+    """Pixels that look different from the neighbour beside, above or below: uint8, in order, padded to whole words of 8 bytes.
+    """
     height, width = triangle.shape
     beside, above = np.empty((2, height * width + 8), np.uint8)
     room, owners = np.zeros((8, width + 16), np.float32), np.zeros((4, width + 16), np.int32)
@@ -341,7 +343,7 @@ def _room(width: int) -> tuple[NDArray[np.uint32], Float32]:
 
 
 def _differing(count: int, *known: NDArray[Any]) -> tuple[Int32, Float32, Int32, Float32]:
-    """Among `count` pixels those whose samples do not all look like the centre, as `kernels_edges.finish` returns them."""
+    """Those of `count` pixels whose samples do not all look like the centre, as `kernels_edges.finish` returns them."""
     pixels, position = np.empty(count, np.int32), np.empty((4 * count, 2), np.float32)
     triangle, inverse = np.empty(4 * count, np.int32), np.empty(4 * count, np.float32)
     n = kernels_edges.finish(count, *known, pixels, position, triangle, inverse)

@@ -1,4 +1,4 @@
-"""The choice of a scene's things that throw light at one another."""
+"""The choice of a scene's things that reflect light onto one another."""
 
 from __future__ import annotations
 
@@ -24,21 +24,21 @@ from viewsphere.model.thing import Thing
 Float = NDArray[np.float64]
 
 LATTICE = 24
-"""Places, each way, from which one looks up for a roof."""
+"""Number of places, in each direction, at which a ray upwards tests for a roof."""
 
 EYES = 0.4
-"""Of a place's height: from where."""
+"""Height of the viewpoint, as a share of a place's height."""
 
 ROOFED = 0.6
-"""Share of a place under a roof from which on it is indoors."""
+"""Share of a place under a roof above which it counts as indoors."""
 
 UP = np.array([[[1e-3, 2e-3, 1]]], np.float32)
-"""Nearly: no ray runs along a wall."""
+"""The direction upwards, tilted slightly so that no ray runs along a wall."""
 
 
 @dataclass(frozen=True, eq=False)
 class _Throwing:
-    """Things that stand still, and which of a stage's triangles of theirs throw light (T,), between low and high (3,)."""
+    """Still things, and the mask (T,) of a stage's triangles that reflect light, between low and high (3,)."""
 
     things: tuple[Thing, ...]
     meshes: tuple[Mesh, ...]
@@ -51,7 +51,9 @@ class _Throwing:
 
 @dataclass(frozen=True, eq=False)
 class BounceScenes:
-    """Finds the things that throw light at one another. The last ones are kept: to find them takes a look at all triangles."""
+    """Finds the things that reflect light onto one another. The latest results are cached, because the search tests all
+    triangles.
+    """
 
     _last: list[_Throwing] = field(default_factory=list[_Throwing])
 
@@ -66,9 +68,10 @@ class BounceScenes:
         has_ground: bool,
         bounces: Literal["auto", "on", "fine", "off"],
     ) -> BounceScene | None:
-        """The scenery that stands still, which lights whatever else is there; in a picture without scenery all targets. None
-        where light is not to bounce: it shall not, or only indoors. ground: equal for grounds made of the same. All calls have
-        the same `bounces`.
+        """The still scenery, which lights everything else; in a picture without scenery, all targets.
+
+        None if light does not bounce: it is switched off, or limited to indoors. `ground` is equal for equal grounds. All calls
+        have the same `bounces`.
         """
         if bounces == "off" or (bounces == "auto" and not arranged.has_scenery):
             return None
@@ -118,13 +121,13 @@ def _corners(rows: Rows, i: int, which: NDArray[np.intp]) -> Float32:
 
 
 def _above(rows: Rows, parts: list[tuple[int, NDArray[np.intp]]], height: np.float32) -> Float32:
-    """Return the corners, (n, 3, 3), of those triangles of all parts that reach above the height."""
+    """Return the corners, (n, 3, 3), of the triangles of all parts that reach above the height."""
     every = (_corners(rows, *part) for part in parts)
     return np.concatenate([corners[corners[..., 2].max(axis=1) > height] for corners in every])
 
 
 def _still(arranged: Arranged) -> list[int]:
-    """The things that count, in their order."""
+    """The indices of the things that count, in their order."""
     if not arranged.has_scenery:
         return [] if arranged.is_sequence else list(range(len(arranged.things)))
     own = range(arranged.targets, len(arranged.things))
@@ -138,8 +141,8 @@ def _eyes(low: Float32, high: Float32) -> np.float32:
 
 @dataclass(frozen=True)
 class _Roof:
-    """A place between two corners (3,). above: the triangles (n, 3, 3) that reach higher than eyes, which are taken out where
-    they are looked at: what is known of a place is kept, its triangles are not.
+    """A place between two corners (3,). above: the triangles (n, 3, 3) that reach above eye height. They are removed after the
+    test: the result for a place is cached, its triangles are not.
     """
 
     key: Hashable
@@ -150,10 +153,8 @@ class _Roof:
 
 @lru_cache(maxsize=4)
 def _is_roofed(roof: _Roof) -> bool:
-    """Return whether most places within a scenery have the underside of something above them; within a solid thing there is
-    none.
-    """
-    # A tree of what is above is small: of a street nearly nothing is.
+    """Return whether most places within a scenery are below the underside of something; within a solid thing there is none."""
+    # The tree of the triangles above is small: in a street, there are almost none.
     low, high, above, eyes = roof.low, roof.high, roof.above.pop(), _eyes(roof.low, roof.high)
     at = (np.arange(LATTICE) + 0.5) / LATTICE
     x, y = np.meshgrid(*(low[k] + at * (high[k] - low[k]) for k in range(2)))

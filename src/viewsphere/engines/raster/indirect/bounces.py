@@ -1,7 +1,7 @@
-"""Light that still things throw at one another, and that of the sky as far as they let it in, baked once a stage.
+"""Light that still things reflect onto one another, and the skylight that they let in, baked once per stage.
 
-A grid of probes around all of them casts rays; patches of what these hit exchange light with the probes until nothing changes.
-Light of lamps and sun reaches patches along rays of their own: nothing depends on what moves, or on any camera.
+A grid of probes around all of them casts rays; patches at the hits exchange light with the probes until it converges. Light of
+lamps and sun reaches patches along separate rays. The result depends on no moving thing and no camera.
 """
 
 from __future__ import annotations
@@ -61,30 +61,32 @@ from viewsphere.engines.raster.sky.kernels_environment import LAMPS
 Float = NDArray[np.float64]
 
 PUSH = 0.3
-"""Cells off its surface at which a sample reads."""
+"""Offset of a sample's lookup from its surface, in cells."""
 
 PATCHES = 2.0
-"""Patches along a cell."""
+"""Number of patches along a cell."""
 
 SUDDENLY = 1e6
-"""One over the cells within which an inner volume's light ends: it has become that of the volume around it."""
+"""Inverse of the number of cells over which an inner volume's light ends, because it already equals that of the outer volume.
+"""
 
 MAP, MAP_RAYS, BEYOND = 96, 128, 0.9
-"""Cells of the ground's map each way, rays of each, and heights of all things that it reaches beyond them."""
+"""Cells of the ground's map in each direction, rays of each cell, and the map's margin around all things, in heights of these.
+"""
 
 SHADOWS = 2e-3
-"""Cells off a surface at which shadows begin."""
+"""Distance, in cells, from a surface at which shadow rays begin."""
 
 UNCHANGED, ROUNDS = 0.002, 48
-"""The share of a patch's light, in the mean of all, below which what further bounces add is not followed but foretold, and how
-many there are at most.
+"""The mean share of a patch's light below which further bounces are extrapolated instead of computed, and the maximum number of
+bounces.
 """
 
 TINY = 1e-12
-"""Light of patches that is none."""
+"""Light of a patch that counts as none."""
 
 MOST_SENT_ON = 0.81
-"""Of light, the share that two bounces send on at most, as far as it is foretold."""
+"""Maximum share of light that two bounces pass on, for the extrapolation."""
 
 TERMS = np.array([1 / 4, *[1 / 2] * 3, *[15 / 16] * 2, 5 / 64, 15 / 16, 15 / 64], np.float32) / np.float32(math.pi)
 """Factors of the terms of irradiance / pi: the constants of spherical harmonics, squared, times the share of each degree that
@@ -94,10 +96,10 @@ irradiance keeps (1, 2/3, 1/4).
 
 @dataclass(frozen=True)
 class BounceScene:
-    """Things that throw light at one another, between the corners low and high (3,) in the stage's units, `unit` metres.
+    """Things that reflect light onto one another, between the corners low and high (3,) in the stage's units, `unit` metres.
 
-    key: equal where all of it is, but for light; which (T,): their triangles; ground_z: the ground's height, None for none;
-    floor: see `painting.Baked`; has_map: whether they stand on the ground, and nothing else does; is_fine: whether more rays
+    key: equal for equal scenes, apart from light; which (T,): their triangles; ground_z: the ground's height, None for none;
+    floor: see `painting.Baked`; has_map: whether these things, and no others, are on the ground; is_fine: whether more rays
     gather light on them.
     """
 
@@ -115,7 +117,7 @@ class BounceScene:
 
     @cached_property
     def digest(self) -> str:
-        """The digest of the bounce scene's content, computed once: it reads all meshes and their pictures."""
+        """The digest of the bounce scene's content, computed once because it reads all meshes and their textures."""
         return digest_of(self._content())
 
     def _content(self) -> Iterator[Any]:
@@ -150,7 +152,7 @@ class _Seen(NamedTuple):
     around: PatchRays | None
 
     def parts(self, values: Float32) -> list[tuple[Volume, Int32, Float32]]:
-        """Of each volume: the patches that its rays hit, and its own rows of values of all probes."""
+        """For each volume, the patches that its rays hit, and its rows of the values of all probes."""
         size = len(self.volumes[0].own)
         cut = (values[k * size : (k + 1) * size] for k in range(len(self.volumes)))
         return list(zip(self.volumes, self.patches.ids, cut, strict=False))
@@ -172,15 +174,15 @@ class _Lighting:
 
 LIGHT = (Bounces, Lightmap, PatchLight)
 SEEN = (*LIGHT, _Seen, Tree, Volume, Grid, Rays, Patches, Table, Look, Charts, Spots, Round, Sites, Facets, PatchRays)
-"""Types of which `Bounces` and `_Seen` are made."""
+"""Types of the values in `Bounces` and `_Seen`."""
 
 
 def bake_bounces(bounce_scene: BounceScene, surrounding: Surrounding, lights: Lights) -> Bounces:
-    """Return the light between the things of a bounce scene. The last scene's rays and light are kept."""
+    """Return the light between the things of a bounce scene. The rays and light of the latest scene are cached."""
     if not len(bounce_scene.which) or not (bounce_scene.high - bounce_scene.low).max() > 0:
         return NO_BOUNCES
     lights = without_maps(lights)
-    # What lamps give the ground near the targets comes from the ground itself.
+    # The light of lamps on the ground near the targets is computed for the ground itself.
     light = surrounding.light.copy()
     light[LAMPS] = 0
     surrounding = surrounding._replace(light=light)
@@ -196,7 +198,7 @@ def bake_bounces(bounce_scene: BounceScene, surrounding: Surrounding, lights: Li
 
 
 def without_maps(lights: Lights) -> Lights:
-    """The same lights without maps of their shadows, which are cast where light bounces."""
+    """The lights without shadow maps, whose shadows are cast by rays for bounced light."""
     return lights._replace(first=np.zeros_like(lights.first))
 
 
@@ -212,7 +214,7 @@ def _tree_of(bounce_scene: BounceScene) -> Tree:
 
 @lru_cache(maxsize=1)
 def _bake(lighting: _Lighting) -> Bounces:
-    """The light of a bounce scene, from the cache where it is there."""
+    """The light of a bounce scene, from the cache if it is there."""
     return kept_light(("bounces", *lighting.content), lambda: _baked(lighting), LIGHT)
 
 
@@ -279,14 +281,14 @@ def _further(first: Float32, second: Float32, third: Float32) -> Float32:
     """Return the light that all further bounces add to patches, (M, 3), from the light that the last three bounces added.
 
     Any two consecutive bounces add the same share of the two before. Single bounces do not: a sunlit wall and a shaded wall
-    that faces it take turns.
+    facing it alternate.
     """
     share = np.divide(third, first, out=np.ones_like(third), where=first > 0).clip(0, MOST_SENT_ON)
     return ((second + third) * share / (1 - share)).astype(np.float32)
 
 
 def _settle(seen: _Seen, light: Float32, views: Float32) -> None:
-    """Even out what all probes know, (N, C)."""
+    """Smooth the light and the views of all probes, (N, C)."""
     lights, sights = ([part for _, _, part in seen.parts(known)] for known in (light, views))
     for volume, *known in zip(seen.volumes, lights, sights, strict=True):
         settle(volume, *known)
@@ -333,7 +335,7 @@ def _shining(
 
 @lru_cache(maxsize=1)
 def _look(bounce_scene: BounceScene) -> _Seen:
-    """Return the results that depend on no light, from the cache where it has them."""
+    """Return the results that do not depend on light, from the cache if they are there."""
     return kept_light(("seen", bounce_scene.digest), lambda: _looked(bounce_scene, tree_of_scene(bounce_scene)), SEEN)
 
 
@@ -380,7 +382,7 @@ def _looked(bounce_scene: BounceScene, tree: Tree) -> _Seen:
 
 
 def _frame(grids: tuple[Grid, ...]) -> Float32:
-    """See `Bounces.frame`."""
+    """The value of `Bounces.frame`."""
     inner, outer = grids[0], grids[-1]
     fades, first = ((1, 1), 0) if len(grids) == 1 else ((SUDDENLY, 1 / LAST), int(np.prod(inner.shape)))
     ends = (fades[0], 0), (fades[1], first)
@@ -410,8 +412,8 @@ def _map(bounce_scene: BounceScene, z: float) -> tuple[Float32, Float32]:
 
 
 def irradiance_weights(directions: Float32) -> Float32:
-    """Of light from each of K directions (..., K, 3) that share the sphere evenly, in the terms of irradiance / pi: (..., K, 9)
-    (Ramamoorthi and Hanrahan 2001).
+    """The weights of light from each of K directions (..., K, 3), which share the sphere evenly, in the terms of irradiance /
+    pi: (..., K, 9) (Ramamoorthi and Hanrahan 2001).
     """
     x, y, z = np.moveaxis(directions.astype(np.float64), -1, 0)
     values = np.stack([np.ones_like(x), *terms(x, y, z)], axis=-1)
@@ -419,6 +421,6 @@ def irradiance_weights(directions: Float32) -> Float32:
 
 
 def _window(size: int) -> Float:
-    """1 within the ground's map, falling to 0 at its border."""
+    """A window that is 1 within the ground's map and falls to 0 at its border."""
     inward = np.minimum(np.arange(size) + 0.5, size - np.arange(size) - 0.5) / (0.15 * size)
     return np.clip(np.minimum(inward[:, None], inward), 0, 1)

@@ -1,4 +1,4 @@
-"""Directions of rays that share a sphere or a dome."""
+"""Ray directions that are evenly distributed over a sphere or a dome."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from viewsphere.engines.raster.records import Float32
 Float = NDArray[np.float64]
 
 TURNS = 8
-"""Ways to turn the rays: two neighbours never look the same way, so that a probe and those around it see as one with all of
-their rays (interleaved sampling, Keller and Heidrich 2001).
+"""Number of rotations of the rays. Neighbours never use the same one, so that a probe and its neighbours together act like one
+probe with all of their rays (interleaved sampling, Keller and Heidrich 2001).
 """
 
 
 def sphere(count: int) -> Float32:
-    """Directions that share the sphere evenly, (count, 3): a Fibonacci spiral. None lies along an axis."""
+    """Directions distributed evenly over the sphere, (count, 3): a Fibonacci spiral. None is along an axis."""
     z = 1 - (2 * np.arange(count) + 1) / count
     return _around(z, np.arange(count))
 
@@ -39,12 +39,12 @@ def turned(directions: Float32) -> Float32:
 
 
 def dome(count: int) -> Float32:
-    """Directions up, as dense as their cosine, (count, 3)."""
+    """Directions upwards, with a density proportional to their cosine, (count, 3)."""
     return _around(np.sqrt(1 - (np.arange(count) + 0.5) / count), np.arange(count))
 
 
 def domes(count: int, ways: int) -> Float:
-    """Directions around the third axis, as dense as their cosine, turned in so many ways, (ways, count, 3)."""
+    """Directions around the third axis, with a density proportional to their cosine, in `ways` rotations, (ways, count, 3)."""
     i, turn = np.arange(count), np.arange(ways)[:, None] * 0.6180339887 % 1.0
     z = np.sqrt(1 - (i + turn) / count)
     angle = (i + turn) * (math.pi * (3 - math.sqrt(5))) + 2 * math.pi * turn

@@ -1,4 +1,4 @@
-"""Surfaces that shine by themselves: points spread over them by their power, from which probes are lit."""
+"""Emissive surfaces: points distributed over them by their power, which light the probes."""
 
 from __future__ import annotations
 
@@ -12,15 +12,15 @@ from viewsphere.engines.raster.materials.kernels_material import L_EB, L_ER, L_U
 from viewsphere.engines.raster.records import Float32, Int32, Surfaces
 
 POINTS = 256
-"""Of all emissive triangles, of which each turn of the probes has its share."""
+"""Number of points on all emissive triangles, shared between the rotations of the probes."""
 
 LARGEST = 0.1
-"""Solid angle of the part that a point stands for, steradians, up to which the point counts."""
+"""Maximum solid angle, in steradians, of the part that a point represents, for the point to count."""
 
 
 class EmissiveTriangles(NamedTuple):
-    """points (J, POINT_COLUMNS): columns named in `kernels_emissive`, none if nothing shines; froms (M,): of each patch, the
-    square of the distance from which on points stand for it, 0 if the triangle is not emissive.
+    """points (J, POINT_COLUMNS): columns named in `kernels_emissive`, empty if nothing is emissive. froms (M,): for each patch,
+    the square of the distance from which points represent it, 0 if the triangle is not emissive.
     """
 
     points: Float32
@@ -30,12 +30,12 @@ class EmissiveTriangles(NamedTuple):
 def emissive_triangles_of(
     which: Int32, surfaces: Surfaces, patches: Patches, emitted: Float32, turns: int
 ) -> EmissiveTriangles:
-    """Return the emissive ones of the triangles `which` (T,). Their patches emit `emitted` (M, 3)."""
+    """Return the emissive triangles among `which` (T,). Their patches emit `emitted` (M, 3)."""
     looks = surfaces.looks
     glow = looks[:, L_ER : L_EB + 1].astype(np.float64) * (looks[:, L_UNLIT : L_UNLIT + 1] == 0)
     material = np.where(patches.triangles >= 0, surfaces.material[which[patches.triangles]], len(looks) - 1)
     for m in np.unique(material[glow[material].sum(axis=1) > 0]).tolist():
-        glow[m] = emitted[material == m].mean(axis=0, dtype=np.float64)  # what its textures leave of it
+        glow[m] = emitted[material == m].mean(axis=0, dtype=np.float64)  # the emission after its textures
     brightness = glow.sum(axis=1)
     shining = which[brightness[surfaces.material[which]] > 0]
     if not len(shining):
@@ -47,7 +47,7 @@ def emissive_triangles_of(
     u, v = ((np.arange(POINTS)[:, None] * step) % 1.0 for step in (0.7548776662, 0.5698402910))  # Roberts' sequence
     u, v = np.where(u + v > 1, 1 - u, u), np.where(u + v > 1, 1 - v, v)
     own_material = surfaces.material[shining[own]]
-    # What one of a turn's points stands for of a surface of brightness 1.
+    # The power that one point of a rotation represents on a surface of brightness 1.
     share = power[-1] * turns / POINTS
     stands_for = share / brightness[own_material]
     points = [

@@ -1,7 +1,7 @@
-"""Volumes of probes: where probes are, and what their rays see of still things, whatever the light.
+"""Volumes of probes: the places of probes, and the hits of their rays on still things, which do not depend on light.
 
-A place that would need too many has two volumes of equal shape, as clipmaps have levels (Tanner, Migdal and Jones 1998): one
-around its origin, where targets stand, and one around that, of wider cells.
+A place that would need too many probes has two volumes of equal shape, like the levels of clipmaps (Tanner, Migdal and Jones
+1998). One is around its origin, near the targets, and one is around that, with wider cells.
 """
 
 from __future__ import annotations
@@ -24,32 +24,32 @@ from viewsphere.engines.raster.reflections.tracing import Tree, cast, unblocked
 Float = NDArray[np.float64]
 
 CELL = 0.2
-"""Metres between probes, at most, unless there would be more than `MOST`."""
+"""Maximum distance between probes in metres, unless there would be more than `MOST`."""
 
 ALONG, MOST = 24, 40_000
-"""Probes along the longest side, at least, and of a volume, at most."""
+"""Minimum number of probes along the longest side, and maximum number of probes of a volume."""
 
 WIDEST, DEPTH, HEIGHT = 0.8, 1.0, 12.0
-"""Metres between probes at most: of a place that would have too many only the part around its origin has some, from so many
-metres below to so many above.
+"""Maximum distance between probes in metres, and the depth below and height above the origin, in metres, of the part that has
+probes in a place that would have too many.
 """
 
 WIDER, FADE, LAST = 6.0, 6.0, 2.0
-"""Size of the outer volume's cells, in cells of the inner volume; cells over which the inner volume's light fades into the
-outer one's; cells over which the outer volume's light fades into skylight.
+"""Size of the outer volume's cells, in cells of the inner volume; number of cells over which the inner volume's light fades
+into the outer one's; number of cells over which the outer volume's light fades into skylight.
 """
 
 ABOVE = 0.25
-"""Cells above the ground where a layer of cells of wide places is: what stands there is lit as places at this height are."""
+"""Height, in cells, of a layer of probes above the ground of wide places: things on the ground are lit as at this height."""
 
 RAYS, FEW_RAYS, MANY_PROBES = 384, 256, 24_000
-"""Of a probe, and of one of so many; half of them beside a lightmap."""
+"""Number of rays of a probe, and of a probe in a volume with at least this many probes; with a lightmap, half of these."""
 
 INSIDE_OUT = 0.5
-"""Share of probes within things from which on it is the room that they are in: it is modelled inside out."""
+"""Share of probes inside things above which the thing counts as a room that is modelled inside out."""
 
 PAD = 2
-"""Cells around all things."""
+"""Margin around all things, in cells."""
 
 
 class Grid(NamedTuple):
@@ -61,17 +61,17 @@ class Grid(NamedTuple):
 
     @property
     def last(self) -> Float:
-        """The place of the last probe, (3,)."""
+        """The position of the last probe, (3,)."""
         return self.corner + (self.shape[::-1] - 1) / self.cells
 
     def resting(self, ground_z: float) -> Grid:
-        """The same, up to a cell higher: one layer is `ABOVE` the ground."""
+        """The grid moved up by at most a cell, so that one layer is `ABOVE` the ground."""
         up = (ground_z - float(self.corner[2])) * self.cells + ABOVE
         return self._replace(corner=self.corner + np.array([0, 0, (up - math.floor(up)) / self.cells]))
 
     def around(self, ground_z: float) -> Grid:
-        """The grid of as many probes around the same middle whose cells are `WIDER`, one layer of which is `ABOVE` the ground;
-        its light ends on all sides but below.
+        """The grid with as many probes around the same middle, but with cells `WIDER`, and one layer `ABOVE` the ground. Its
+        light ends on all sides except below.
         """
         half = (self.last - self.corner) / 2
         corner = self.corner + half - WIDER * half
@@ -81,9 +81,9 @@ class Grid(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Volume:
-    """N probes. own (N,): which probe each ray's origin is; opens (3, N): whether nothing lies between a probe and the next one
-    along x, y and z, None where they are too far apart to know the same; rank (N,), screens (N, 72): see
-    `kernels_probes.screen`; is_inside_out: whether most lie within things.
+    """N probes. own (N,): the probe of each ray origin. opens (3, N): whether nothing is between a probe and the next one along
+    x, y and z; None if probes are too far apart to share values. rank (N,), screens (N, 72): see `kernels_probes.screen`.
+    is_inside_out: whether most probes are within things.
     """
 
     grid: Grid
@@ -101,7 +101,7 @@ class Volume:
 
 
 def grids_of(low: Float, high: Float, unit: float) -> tuple[Grid, ...]:
-    """The grids of things between two corners (3,) in lengths of `unit` metres, finest first."""
+    """The grids around things between two corners (3,), in lengths of `unit` metres, finest first."""
     cells = max(unit / CELL, ALONG / float((high - low).max()))
     if np.prod(_shape((high - low) * unit / WIDEST)) <= MOST:
         return (_grid(low, high, cells),)
@@ -117,7 +117,7 @@ def rays_of_probes(grids: tuple[Grid, ...], has_charts: bool) -> Float32:
 
 
 def volume_of(grid: Grid, tree: Tree, normals: Float32, directions: Float32, is_finest: bool) -> Volume:
-    """Return the volume of probes that see a tree's triangles. normals (T, 3): of the triangles."""
+    """Return the volume of probes that see a tree's triangles; normals (T, 3) are those of the triangles."""
     points, turn, own = _points(grid)
     met, far = cast(tree, points, directions, turn, np.inf)
     buried = np.empty(len(points), np.uint8)
@@ -127,14 +127,16 @@ def volume_of(grid: Grid, tree: Tree, normals: Float32, directions: Float32, is_
         buried[buried == 1] = 0
     screens, rank = np.empty((len(points), 72), np.float32), np.zeros_like(buried)
     kernels.screen(met, far, directions, turn, own, normals, np.float32(grid.cells), grid.shape, buried, screens, rank)
-    # What a buried probe sees counts for nothing: the inner sides of things need no patches.
+    # Hits of a buried probe are ignored: the inner sides of things need no patches.
     met[:, buried[own] > 0] = -1
     opens = _opens(grid, tree, points, own, buried) if is_finest else None
     return Volume(grid, Rays(points, directions, turn, met, far), own, opens, rank, screens, is_inside_out)
 
 
 def settle(volume: Volume, light: Float32, views: Float32) -> None:
-    """Mix what neighbours that see each other know, (N, 28) and (N, M), and give buried probes what one beside them knows."""
+    """Mix the values, (N, 28) and (N, M), of neighbouring probes that see each other, and copy the value of a neighbour to
+    buried probes.
+    """
     if volume.opens is not None:
         _smooth(light, volume.opens, volume.grid.shape)
         _smooth(views, volume.opens, volume.grid.shape)
@@ -145,8 +147,8 @@ def settle(volume: Volume, light: Float32, views: Float32) -> None:
 
 
 def join(inner: Volume, outer: Volume, known: Iterable[tuple[Float32, Float32]]) -> None:
-    """Make what the inner probes know (N, C) become what the outer ones do, (N, C), towards the border, of each pair of arrays:
-    who reads beyond it sees no seam.
+    """Blend the values of the inner probes (N, C) into those of the outer ones, (N, C), towards the border, for each pair of
+    arrays, so that no seam is visible beyond it.
     """
     grid, shape = inner.grid, outer.grid.shape
     at = np.indices(tuple(grid.shape.tolist())).reshape(3, -1).T
@@ -179,7 +181,7 @@ def _shares(part: Float32, screens: Float32) -> Float32:
 
 
 def _smooth(light: Float32, opens: Float32, shape: NDArray[np.int64]) -> None:
-    """By all three axes each way to turn the rays counts an eighth."""
+    """Smooth the light along all three axes; each rotation of the rays then has a weight of an eighth."""
     other = np.empty_like(light)
     for axis, step in enumerate((1, int(shape[2]), int(shape[1] * shape[2]))):
         kernels.blur(light, opens[axis], step, other)
@@ -187,7 +189,7 @@ def _smooth(light: Float32, opens: Float32, shape: NDArray[np.int64]) -> None:
 
 
 def _grid(low: Float, high: Float, cells: float) -> Grid:
-    """Of at most `MOST` probes."""
+    """A grid of at most `MOST` probes."""
     size = high - low
     while np.prod(_shape(size * cells)) > MOST:
         cells *= 0.97
@@ -197,12 +199,14 @@ def _grid(low: Float, high: Float, cells: float) -> Grid:
 
 
 def _shape(size: Float) -> NDArray[np.int64]:
-    """Columns, rows and layers (3,) around a box of this size in cells; walls of even sizes do not run along probes."""
+    """Columns, rows and layers (3,) around a box of this size in cells, chosen so that walls of even sizes do not run along
+    probes.
+    """
     return (np.ceil(size + 0.5) + 2 * PAD + 1).astype(np.int64)
 
 
 def _part(low: Float, high: Float, unit: float) -> tuple[Float, Float]:
-    """The part of a wide place around its origin, where targets stand, or around its middle, that may have enough probes."""
+    """The part of a wide place that may have enough probes: around its origin, near the targets, or around its middle."""
     middle = np.where((low <= 0) & (high >= 0), 0.0, (low + high) / 2)
     below, above, side = DEPTH / unit, HEIGHT / unit, math.sqrt(MOST * WIDEST**3 / (DEPTH + HEIGHT)) / unit
     first, last = np.array([-side / 2, -side / 2, -below]), np.array([side / 2, side / 2, above])
@@ -212,7 +216,7 @@ def _part(low: Float, high: Float, unit: float) -> tuple[Float, Float]:
 def _points(grid: Grid) -> tuple[Float32, Int32, Int32]:
     """Return the places of all probes (N, 3), sorted by turn, with each probe's turn and its index in the volume.
 
-    Any two by two by two neighbouring probes have all turns.
+    Any block of two by two by two neighbouring probes has all rotations.
     """
     at = np.indices(tuple(grid.shape.tolist())).reshape(3, -1).T[:, ::-1]
     turn = at % 2 @ [1, 2, 4]
@@ -221,7 +225,8 @@ def _points(grid: Grid) -> tuple[Float32, Int32, Int32]:
 
 
 def _opens(grid: Grid, tree: Tree, points: Float32, own: Int32, buried: NDArray[np.uint8]) -> Float32:
-    """Return whether nothing lies between each probe and the next along x, y and z, and neither is buried: (3, N), by place."""
+    """Return whether the way between each probe and the next along x, y and z is free, and neither is buried: (3, N), by place.
+    """
     shape = grid.shape
     at = np.indices(tuple(shape.tolist())).reshape(3, -1)[::-1]
     opens = np.empty((3, len(points)), np.float32)

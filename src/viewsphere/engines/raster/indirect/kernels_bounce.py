@@ -1,10 +1,11 @@
-"""Light that things throw at one another, as the samples of a block find it: in a volume of probes and a map of the ground.
+"""Light that things reflect onto one another, looked up for the samples of a block in a volume of probes and a map of the
+ground.
 
-A probe holds the irradiance of every direction, spherical harmonics up to degree 2 (Ramamoorthi and Hanrahan 2001), and what it
-sees in each, for mirrors (`kernels_views`). A sample reads the eight
-probes around it a little off its surface: those in front of the surface, and of these only such as see it. What a probe sees of
-a cell is bounded by two planes for each of the eight cells around it, from the rays it was baked with; without this a lit room
-would shine through its walls (cf. Majercik, Guertin, Nowrouzezahrai and McGuire 2019, who keep depths).
+A probe stores the irradiance for every direction, as spherical harmonics up to degree 2 (Ramamoorthi and Hanrahan 2001), and
+its view in each direction, for mirrors (`kernels_views`). A sample reads the eight probes around it slightly off its surface:
+only those that are in front of the surface and see it. Two planes for each of the eight cells around a probe bound the part of
+the cell that the probe sees; they come from the rays it was baked with. Without them, light of a lit room would leak through
+its walls (cf. Majercik, Guertin, Nowrouzezahrai and McGuire 2019, who store depths).
 """
 
 from __future__ import annotations
@@ -62,13 +63,13 @@ i4 = nb.int32
 U = nb.uintp
 
 FRAME = 7  # columns of Bounces.frame
-COLUMNS = 28  # of Bounces.light: irradiance / pi in nine terms of red, green and blue; the last is unused
+COLUMNS = 28  # columns of Bounces.light: irradiance / pi in nine terms of red, green and blue; the last is unused
 SCREENS = 2
-BEHIND = 0.02  # least weight of a probe that lies behind the surface
-# Least weights of a probe that does not see the surface: of most, of one within a thing, of one under the open sky.
+BEHIND = 0.02  # minimum weight of a probe behind the surface
+# Minimum weights of a probe that does not see the surface: for most probes, for one within a thing, for one under the open sky.
 HIDDEN, BURIED, OUTDOORS = 2e-3, 2e-5, 2e-7
 SHARP = 20.0  # one over the depth behind a screen, in cells, at which a probe no longer counts
-SLACK = -0.02  # cells behind a screen that still count in full; less than none, so that probes within a wall never count
+SLACK = -0.02  # cells behind a screen that still count in full; negative, so that probes within a wall never count
 LEANING = 0.45  # how far the lobe of a rough surface leans from its normal (0) towards the mirrored ray (1)
 OFF = 0.1  # cells off the surface from which a sample looks at the screens
 PLACE, FIRST_X, FIRST_Y, FIRST_Z = LX, LY, LZ, GLOW_R  # scratch; the cell's first corner
@@ -82,12 +83,13 @@ def _within(most_of):
 
 @lanewise
 def _place(frame, columns, rows, layers, b):
-    """PLACE: the first of the eight probes around; T0 to T7: their weights by place and by what is in front of the surface.
+    """PLACE: the first of the eight probes around; T0 to T7: their weights by distance and by their position in front of the
+    surface.
 
-    FIRST_X to FIRST_Z: where the sample's view of the screens begins, in cells from the first probe; INSIDE: how far inside
-    the volumes it reads, 0..1: of both, the inner one wherever the sample is within.
+    FIRST_X to FIRST_Z: the point, in cells from the first probe, from which the sample tests the screens. INSIDE: how far
+    inside the volumes the sample reads, 0..1. If the sample is within both volumes, the inner one is used.
     """
-    # Halfway between both normals: bumps hardly move it, and facets of a round thing do not show.
+    # Halfway between both normals: bumps hardly move it, and facets of a round thing stay invisible.
     normal = tuple((n + g) * 0.5 for n, g in zip(b.get(NX, NY, NZ), b.get(GX, GY, GZ), strict=True))
     position, shape = b.get(PX, PY, PZ), (columns, rows, layers)
     own, outer = ([(p - frame.one(at + k)) * frame.one(at + 3) for k, p in enumerate(position)] for at in (0, FRAME))
@@ -141,7 +143,7 @@ def _look(typing, screens, cell, x, y, z, b, at):
 
 @inner(fastmath=FAST)
 def _screen(count, screens, b):
-    """Rows PROBES on: how much each of the eight probes sees of the samples."""
+    """Rows PROBES on: the share of the samples that each of the eight probes sees."""
     for i in range(U(count)):
         place = b[U(FIRST_X) + i], b[U(FIRST_Y) + i], b[U(FIRST_Z) + i]
         _look(screens, U(i4(b[U(PLACE) + i])), place[0], place[1], place[2], b, U(PROBES) + i)
@@ -158,7 +160,7 @@ def _weigh(b):
 
 @inner(fastmath=FAST)
 def _read(count, light, columns, layer, b):
-    """Rows PROBES on: the weighted sum of the columns of the eight probes. layer: probes in one."""
+    """Rows PROBES on: the weighted sum of the columns of the eight probes. layer: number of probes in a layer."""
     one = U(1)
     for i in range(U(count)):
         if b[U(MAPPED) + i] > f4(0):
@@ -171,13 +173,13 @@ def _read(count, light, columns, layer, b):
 
 
 def terms(x, y, z):
-    """The nine polynomials that the columns of irradiance are factors of, but for the first, which is 1."""
+    """The nine polynomials that the columns of irradiance multiply, except the first, which is 1."""
     return y, z, x, x * y, y * z, 3 * z * z - 1, x * z, x * x - y * y
 
 
 @lanewise
 def _shine(b):
-    """GLOW, and LEAN: of a surface that leans towards the mirrored ray. The lightmap knows the same of both."""
+    """GLOW, and LEAN: the value for a surface that leans towards the mirrored ray. The lightmap has the same value for both."""
     inside, open_, is_mapped = b[INSIDE], b[OPEN], b[MAPPED] > 0
     normal, view = b.get(NX, NY, NZ), b.get(VX, VY, VZ)
     along = clamp(dot(normal, view))
@@ -195,7 +197,7 @@ def _shine(b):
 
 @lanewise
 def _place_on_floor(frame, across, b):
-    """T0: 1 more than the index of the first of four cells, 0 beyond the map; T1 to T4: weights. `across`: cells a row."""
+    """T0: 1 more than the index of the first of four cells, 0 beyond the map; T1 to T4: weights. `across`: cells in a row."""
     u = (b[PX] - frame.one(1)) * frame.one(0) - 0.5
     v = (b[PY] - frame.one(2)) * frame.one(0) - 0.5
     is_within = (u >= 0) & (v >= 0) & (u < across - 1) & (v < across - 1)
@@ -225,7 +227,7 @@ def _read_floor(count, floor, frame, b):
 
 @lanewise
 def _darken(b):
-    """Darken this light, too, by the value of an occlusion texture."""
+    """Multiply this light, too, by the value of an occlusion texture."""
     for row, lean in ((GLOW_R, LEAN_R), (GLOW_G, LEAN_G), (GLOW_B, LEAN_B)):
         b[row] = b[lean] = b[row] * b[AO]
     b[INSIDE] = 0
@@ -236,7 +238,7 @@ def dim_by_near(start, count, slots, near, b):
     """Replace the probes' light that near surfaces block from the samples `slots` by the near surfaces' own light."""
     for i in range(U(count)):
         own = near[U(slots[U(start) + i])]
-        known = max(b[U(INSIDE) + i], b[U(MAPPED) + i]) * b[U(OPEN) + i]  # as much as there is of the probes' light
+        known = max(b[U(INSIDE) + i], b[U(MAPPED) + i]) * b[U(OPEN) + i]  # in proportion to the probes' light
         for k in range(U(3)):
             for row in (U(GLOW_R) + k * U(BLOCK) + i, U(LEAN_R) + k * U(BLOCK) + i):
                 b[row] = b[row] * own[U(0)] + own[U(1) + k] * known
@@ -244,8 +246,8 @@ def dim_by_near(start, count, slots, near, b):
 
 @inner
 def bounced(count, bounces, is_ground, own, b):
-    """Fill GLOW, LEAN, INSIDE and MAPPED of a block that has been occluded, and from KEPT on the weights of the eight probes
-    around and which is the first. own: the samples' triangles, unless they are of the ground.
+    """Fill GLOW, LEAN, INSIDE and MAPPED of a block after occlusion; rows KEPT and on get the weights of the eight probes
+    around, and the first of these. own: the samples' triangles, unless they are on the ground.
 
     Overwrites the rows of a light.
     """

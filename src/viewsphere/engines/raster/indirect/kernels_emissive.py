@@ -1,8 +1,8 @@
-"""Light of surfaces that shine by themselves, as it arrives at probes and at the ground's map.
+"""Light of emissive surfaces at probes and at the ground's map.
 
-A small lamp is hit by few of a probe's rays or by none: from far away it is looked at from points spread over it. From near by
-the rays that hit it are better; which of the two counts is decided by how large the part of the lamp looks that a point stands
-for, so that each part counts once.
+Few or none of a probe's rays hit a small lamp, so a distant lamp is sampled by points distributed over it. Nearby, the rays
+that hit it are more accurate. The apparent size of the part that a point represents selects between the two, so that each part
+counts once.
 """
 
 from __future__ import annotations
@@ -16,20 +16,20 @@ from viewsphere.kernels.jit import inner, njit
 
 f4 = nb.float32
 U = nb.uintp
-# Columns of an emissive triangle's points: where it is, its normal, radiance times the area it stands for, the square of the
-# distance from which on it counts.
+# Columns of an emissive triangle's points: its place, its normal, radiance times the area it represents, the square of the
+# distance beyond which it counts.
 POINT_X, NORMAL_X, POWER_R, FROM, POINT_COLUMNS = 0, 3, 6, 9, 10
 
 
 @inner
 def shine_from(tree, point, p, off, stack):
-    """The direction to a point of an emissive triangle, and the factor of its power; 0 where it is hidden or near."""
+    """The direction to a point of an emissive triangle, and the factor of its power; 0 if the point is hidden or near."""
     d = point[POINT_X] - p[0], point[POINT_X + 1] - p[1], point[POINT_X + 2] - p[2]
     squared = d[0] * d[0] + d[1] * d[1] + d[2] * d[2]
     along = d[0] * point[NORMAL_X] + d[1] * point[NORMAL_X + 1] + d[2] * point[NORMAL_X + 2]
     if squared <= point[FROM] or along == f4(0):
         return d, f4(0)
-    # A little off the side that is seen: the point's own surface hides nothing.
+    # Slightly off the visible side, so that the point's own surface hides nothing.
     side = -off if along > f4(0) else off
     way = (
         d[0] + side * point[NORMAL_X],
@@ -45,9 +45,10 @@ def shine_from(tree, point, p, off, stack):
 
 @njit(_nrt=True)
 def shine_at_probes(tree, places, turn, own, turns, points, squares, off, per, fold, light, views):
-    """Add to rows `own` (N,) of light (N, 28) and views (N, NODES, 4) what arrives at probes (N, 3) from every `turns`-th of
-    the points (J, POINT_COLUMNS), beginning with that of the probe's turn. squares (9,): factors of the terms of irradiance /
-    pi; per: a ray's share of the sphere; fold: see `kernels_views`.
+    """Add to rows `own` (N,) of light (N, 28) and views (N, NODES, 4) the light that arrives at probes (N, 3) from every
+    `turns`-th of the points (J, POINT_COLUMNS), beginning with the point of the probe's turn.
+
+    squares (9,): factors of the terms of irradiance / pi; per: a ray's share of the sphere; fold: see `kernels_views`.
     """
     stack = np.empty((DEEP, 2), np.float32)
     for i in range(places.shape[0]):
@@ -67,9 +68,10 @@ def shine_at_probes(tree, places, turn, own, turns, points, squares, off, per, f
 
 @njit
 def shine_near(ids, far, turn, own, weights, directions, froms, emitted, fold, light, views):
-    """Add to light (N, 28) and views (N, NODES, 4) what arrives along rays that hit emissive triangles close by. froms (M,):
-    the square of the distance from which on points stand for a patch, 0 for patches that are not emissive; emitted (M, 3); the
-    others as in `kernels_probes.send` and `kernels_views`.
+    """Add to light (N, 28) and views (N, NODES, 4) the light that arrives along rays that hit nearby emissive triangles.
+
+    froms (M,): the square of the distance from which points represent a patch, 0 for patches that are not emissive; emitted (M,
+    3); the others as in `kernels_probes.send` and `kernels_views`.
     """
     for k in range(ids.shape[0]):
         for i in range(ids.shape[1]):
@@ -86,8 +88,8 @@ def shine_near(ids, far, turn, own, weights, directions, froms, emitted, fold, l
 
 @njit(_nrt=True)
 def shine_at(tree, places, normals, step, share, points, ids, far, froms, emitted, off, light):
-    """Add to light (N, 3 or more) the radiance of white matt surfaces at places (N, 3) that emissive triangles light: by every
-    `step`-th point, which counts `share`, and by cosine-weighted rays (K, N).
+    """Add to light (N, 3 or more) the radiance of white matt surfaces at places (N, 3), lit by emissive triangles: by every
+    `step`-th point, with weight `share`, and by cosine-weighted rays (K, N).
     """
     stack = np.empty((DEEP, 2), np.float32)
     per = f4(1) / f4(ids.shape[0])

@@ -1,8 +1,8 @@
-"""The view of a volume's probes, from the rays that were cast from them.
+"""The view from a volume's probes, computed from the rays that were cast from them.
 
-Ray hits are gathered in patches: places that are close together, of one material, and look the same way. Patches and probes
-exchange light until it no longer changes (Goral, Torrance, Greenberg and Battaile 1984; irradiance volumes as Greger,
-Shirley, Hubbard and Greenberg 1998).
+Ray hits are grouped into patches: places that are close together, have one material, and face the same way. Patches and probes
+exchange light until it converges (Goral, Torrance, Greenberg and Battaile 1984; irradiance volumes as in Greger, Shirley,
+Hubbard and Greenberg 1998).
 """
 
 from __future__ import annotations
@@ -45,22 +45,22 @@ f4 = nb.float32
 U = nb.uintp
 SKY, FAR_GROUND, GROUND = -1, -2, -3
 NO_MATERIAL = -1
-AWAY = 24  # patches outside of the probes' box from which on they are twice as wide
-HITS = 4  # of a patch that are shaded, at most
+AWAY = 24  # distance outside the probes' box, in patches, from which they are twice as wide
+HITS = 4  # maximum hits of a patch that are shaded
 CLUSTERS = 6
 ALIKE = 0.9  # cosine between normals of one screen
 FEWEST = 2  # rays of a screen
 SECOND = 0.12  # share of the rays towards a cell that a second screen must have
-# Shares of rays from which on a probe is within a thing: that meet the inner side of one of any size, or of one that is so many
-# cells away at most; or that meet anything so close, as in a cupboard.
+# Shares of rays above which a probe is within a thing: rays that hit the inner side of a thing of any size, or of one at most
+# this many cells away; or rays that hit anything this close, as in a cupboard.
 WITHIN, WITHIN_CLOSE, SHUT_IN, CLOSE = 0.95, 0.5, 0.97, 3.5
-OPEN_SKY = 0.4  # share of the rays up that meet nothing from which on a probe knows nothing of what it does not see
+OPEN_SKY = 0.4  # share of the upward rays without a hit above which a probe counts as under the open sky
 
 
 @inner
 def patch_key(p, normal, cells, box, m):
-    """One number for a patch: its cell, the axis along which its normal is longest, and its material. Patches outside of the
-    probes' box are the larger the farther they are.
+    """One number for a patch: its cell, the axis along which its normal is longest, and its material. Outside the probes' box,
+    the size of patches grows with the distance.
     """
     axis, out = 0, f4(0)
     for k in range(3):
@@ -80,12 +80,12 @@ def patch_key(p, normal, cells, box, m):
 
 @njit
 def patch(met, far, origins, directions, turn, normals, materials, box, cells, ground, table, count, ids):
-    """The patch that each ray hits, into ids (K, N) int32, SKY or FAR_GROUND for none; returns how many patches there are then,
-    of which there were `count` before, or -1 if there is no room for more.
+    """Write the patch that each ray hits into ids (K, N) int32, SKY or FAR_GROUND for none, and return the new number of
+    patches. There were `count` before; the result is -1 if there is no room for more.
 
     met, far (K, N): triangle or -1, distance; directions, turn: see `kernels_trace.cast`; box (6,): lowest and highest x, y, z
-    of the probes, from the first of which patches are counted, `cells` in a length; ground (6,): its height, the box (lowest
-    and highest x and y) within which it has patches, whether there is one; table: see `radiosity_patches.Table`.
+    of the probes. Patches are counted from its lowest corner, `cells` in a length. ground (6,): its height, the box (lowest and
+    highest x and y) within which it has patches, and whether there is a ground; table: see `radiosity_patches.Table`.
     """
     m_ground = nb.int64(NO_MATERIAL)
     for k in range(U(directions.shape[1])):
@@ -129,8 +129,8 @@ def patch(met, far, origins, directions, turn, normals, materials, box, cells, g
 
 @inner
 def _sight(tree, lights, k, which, p, n, stack):
-    """Return whether light k reaches a place: 1 or 0. which: a number that says which part of a rectangle is looked at, its
-    middle if negative.
+    """Return whether light k reaches a place: 1 or 0. which: the number of the tested part of a rectangular light, its middle
+    if negative.
     """
     if lights.kind[k] == DISTANT:
         d = lights.place[k, 0], lights.place[k, 1], lights.place[k, 2]
@@ -146,7 +146,7 @@ def _sight(tree, lights, k, which, p, n, stack):
             place[2] + u * right[2] + v * up[2] - p[2],
         )
         limit = f4(0.999)
-        if lights.kind[k] != AREA:  # what lies within a ball that shines is its bulb
+        if lights.kind[k] != AREA:  # anything within a spherical light is its bulb
             limit = f4(1) - lights.radius[k] / np.sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2])
     if d[0] * n[0] + d[1] * n[1] + d[2] * n[2] <= f4(0):
         return f4(0)
@@ -156,7 +156,7 @@ def _sight(tree, lights, k, which, p, n, stack):
 
 @inner
 def _arrive(start, count, tree, lights, off, is_varied, arrived, b, stack):
-    """arrived: irradiance of all lights at the block's samples, shadows cast."""
+    """Write irradiance of all lights at the block's samples, with cast shadows, into `arrived`."""
     for i in range(count):
         for c in range(3):
             arrived[start + i, c] = f4(0)
@@ -177,7 +177,7 @@ def _arrive(start, count, tree, lights, off, is_varied, arrived, b, stack):
 
 @inner
 def _answer(count, start, answers, b):
-    """Reflectance and emission of the block's samples; lobes that mirror are taken as if they scattered. Unlit surfaces send
+    """Reflectance and emission of the block's samples; mirroring lobes are treated as if they scattered. Unlit surfaces send
     their colour.
     """
     for i in range(count):
@@ -213,10 +213,10 @@ def shade_hits(
     """Fill in the material and the light of the places (M, 3) that rays of directions `ways` (M, 3) hit.
 
     All places are on the ground, or none is; `pixels` (M,) are their widths. answers (M, 6) or (M, 7): reflectance, emitted
-    light and, where there is room, opacity; arrived (M, 3): irradiance of all lights.
+    light and, if there is room, opacity; arrived (M, 3): irradiance of all lights.
 
-    off: the distance from a surface at which shadows begin. Each hit sees a rectangular light at one place. If `is_varied`,
-    this is another place for each hit, so that means over many hits are unbiased; otherwise it is the light's middle.
+    off: the distance from a surface at which shadows begin. Each hit tests a rectangular light at one place. If `is_varied`,
+    this place differs from hit to hit, so that means over many hits are unbiased; otherwise it is the light's middle.
     """
     b, stack = np.zeros(ROWS * BLOCK, np.float32), np.empty((DEEP, 2), np.float32)
     own, which = np.empty(BLOCK, np.int32), np.empty(BLOCK, np.int32)
@@ -232,7 +232,7 @@ def shade_hits(
             gather(surfaces, count, triangle, b, own, which)
         material(count, view, surfaces, textures, b, which)
         weigh(count, albedo, b)
-        if is_ground and floor[4] == f4(1):  # ground that only scatters has its colour apart
+        if is_ground and floor[4] == f4(1):  # ground that only scatters has its colour stored separately
             for i in range(count):
                 for c in range(3):
                     b[BASE_R + c * BLOCK + i] = b[RED + c * BLOCK + i]
@@ -259,8 +259,8 @@ def sky_from(surrounding, directions, rough, light):
 
 @njit(fastmath=FAST, _nrt=True)
 def look_up(bounces, places, normals, triangles, glow, inside):
-    """Radiance of white matt surfaces at places (M, 3) on triangles (M,), negative on the ground, with these normals (M, 3),
-    into glow (M, 3), and the share of it that probes or the lightmap know, into inside (M,).
+    """Write radiance of white matt surfaces at places (M, 3) on triangles (M,), negative on the ground, with these normals (M,
+    3), into glow (M, 3). Write the share that comes from probes or the lightmap into inside (M,).
     """
     b, own = np.zeros(ROWS * BLOCK, np.float32), np.zeros(BLOCK, np.int32)
     for start in range(0, places.shape[0], BLOCK):
@@ -302,8 +302,8 @@ def send(ids, turn, own, weights, sky, far_ground, sent, light):
 
 @njit
 def blur(light, opens, step, out):
-    """Half of each probe's light from the probe itself, a quarter from the one before and the one behind along an axis, `step`
-    probes away, as far as nothing lies between: opens (N,) is 1 where the way to the next one is free.
+    """Smooth along an axis: half of each probe's light from the probe itself, a quarter from each neighbour, `step` probes
+    away, if the way is free. opens (N,) is 1 if nothing is between a probe and the next one.
     """
     quarter = f4(0.25)
     for i in range(light.shape[0]):
@@ -351,7 +351,7 @@ def choose(rank, shape, light, chosen):
 
 @inner
 def _octant(d):
-    """Return the one of the eight cells around a probe that a direction goes to: bit k is set if it goes up axis k."""
+    """Return which of the eight cells around a probe a direction points to: bit k is set if it goes up axis k."""
     octant = 0
     for axis in range(3):
         octant += (1 << axis) if d[axis] >= f4(0) else 0
@@ -360,8 +360,8 @@ def _octant(d):
 
 @inner
 def _add_hit(own, n, along, far):
-    """Count a hit among those of about the same normal. own (CLUSTERS, 5): sums of normals on the probe's side and of planes'
-    offsets, and how many there are; along: cosine between ray and normal; far: in cells.
+    """Count a hit among hits with about the same normal. own (CLUSTERS, 5): sums of normals on the probe's side and of planes'
+    offsets, and their number; along: cosine between ray and normal; far: in cells.
     """
     side = f4(-1) if along > f4(0) else f4(1)
     for c in range(CLUSTERS):
@@ -377,8 +377,8 @@ def _add_hit(own, n, along, far):
 
 @inner
 def _place_screen(found, which, least, bits, cell, screens):
-    """The plane of the normal that most hits have, as screen `which` of a cell's corner; there must be `least` of them, which
-    are forgotten then.
+    """Store the plane of the most frequent normal among the hits as screen `which` of a cell's corner. It needs at least
+    `least` hits, which are then removed.
     """
     best = 0
     for c in range(1, CLUSTERS):
@@ -399,7 +399,7 @@ def _place_screen(found, which, least, bits, cell, screens):
 
 @inner
 def _cell_of(octant, at, rows, columns):
-    """The cell that lies this way from a probe, and which of its corners the probe is; no cell is below 0."""
+    """The cell in this direction from a probe, and the corner of the cell at which the probe is; no cell index is below 0."""
     bits, x, y, z = 7 - octant, at % columns, at // columns % rows, at // (columns * rows)
     u, v, w = x - (bits & 1), y - (bits >> 1 & 1), z - (bits >> 2 & 1)
     return (w * rows + v) * columns + u if u >= 0 and v >= 0 and w >= 0 else -1, bits
@@ -407,7 +407,7 @@ def _cell_of(octant, at, rows, columns):
 
 @njit
 def bury(met, far, directions, turn, own, normals, cells, buried):
-    """Mark probes within things in buried (N,) uint8: 2 within a small thing, 1 within one of any size, else 0."""
+    """Mark probes within things in buried (N,) uint8: 2 within a small thing, 1 within one of any size, otherwise 0."""
     for i in range(met.shape[1]):
         inner_sides = close = shut = 0
         for k in range(directions.shape[1]):
@@ -425,9 +425,11 @@ def bury(met, far, directions, turn, own, normals, cells, buried):
 
 @njit(_nrt=True)
 def screen(met, far, directions, turn, own, normals, cells, shape, buried, screens, rank):
-    """Fill Bounces.screens (N, 72): of the hits of each probe that lie in one of the eight cells around it, the planes of the
-    two normals that most of them have. own (N,): which probe each column is; shape (3,): layers, rows, columns. A buried probe
-    sees nothing of any cell. Fill rank (N,) uint8: 0 of buried probes, 1 of those under the open sky, 2 of others.
+    """Fill Bounces.screens (N, 72): for each of the eight cells around a probe, the planes of the two most frequent normals
+    among the hits inside the cell.
+
+    own (N,): the probe of each column; shape (3,): layers, rows, columns. A buried probe sees nothing of any cell. Fill rank
+    (N,) uint8: 0 for buried probes, 1 for probes under the open sky, 2 for others.
     """
     rows, columns = shape[1], shape[2]
     for k in range(screens.shape[1]):
@@ -460,8 +462,8 @@ def screen(met, far, directions, turn, own, normals, cells, shape, buried, scree
 
 @njit(fastmath=FAST)
 def see_around(ids, first, sky, below, light):
-    """Add to rows first and on of light (N, 3) what comes along rays (K, N) from the sky, (n, K, 3) of n rows, and from the
-    ground far away (3,).
+    """Add to the rows of light (N, 3) from `first` on the light that arrives along rays (K, N) from the sky, (n, K, 3) for n
+    rows, and from the distant ground (3,).
     """
     per = f4(1) / f4(ids.shape[0])
     for i in range(U(sky.shape[0])):
@@ -476,8 +478,10 @@ def see_around(ids, first, sky, below, light):
 
 @njit(fastmath=FAST)
 def send_around(ids, alone, share, far, sent, glow, inside):
-    """As `look_up`, of patches `alone` (N,), each in as many rows as it has hits, which count `share` (N,): cosine-weighted
-    rays (K, N) from there hit patches `ids` that send `sent` (M, 3); far (N, 3): what else comes to them.
+    """The equivalent of `look_up` for patches `alone` (N,), each with one row per hit, weighted by `share` (N,).
+
+    Cosine-weighted rays (K, N) from there hit patches `ids` that send `sent` (M, 3); far (N, 3) is the other light that reaches
+    them.
     """
     for i in range(U(ids.shape[1])):
         inside[U(alone[i])] = f4(1)
@@ -495,8 +499,8 @@ def send_around(ids, alone, share, far, sent, glow, inside):
 
 @njit(fastmath=FAST)
 def send_down(ids, sent, floor):
-    """Radiance of white matt ground lit by things alone, of places from which cosine-weighted rays (K, N) hit patches, into
-    floor (N, 4).
+    """Write radiance of white matt ground lit only by things into floor (N, 4), for places from which cosine-weighted rays (K,
+    N) hit patches.
     """
     floor[:] = f4(0)
     per = f4(1) / f4(ids.shape[0])

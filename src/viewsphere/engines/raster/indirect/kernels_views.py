@@ -1,8 +1,8 @@
 """A probe's view in each direction: the light that things send, and the share of sky and ground that they leave visible.
 
 Directions are the nodes of an octahedron unfolded to a square (Cigolle et al. 2014, *A Survey of Efficient Representations for
-Independent Unit Vectors*), between which a value is bilinear: about as blurred as a mirror of roughness 0.5 shows it. At the
-square's rim two nodes, or four, are one direction; they hold the same.
+Independent Unit Vectors*). Values are bilinear between nodes, about as blurred as in a mirror of roughness 0.5. At the square's
+rim, two or four nodes represent one direction and have equal values.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ _blend4 = blend(4)
 
 
 def _fold() -> NDArray[np.int32]:
-    """The node that stands for each node's direction, (NODES,) int32."""
+    """The node that represents each node's direction, (NODES,) int32."""
     v, u = np.indices((SIDE, SIDE))
     is_corner = np.isin(u, (0, SIDE - 1)) & np.isin(v, (0, SIDE - 1))
     v = np.where(np.isin(u, (0, SIDE - 1)), np.minimum(v, SIDE - 1 - v), v)
@@ -54,7 +54,9 @@ FOLD = _fold()
 
 @inner
 def add_view(own, fold, x, y, z, red, green, blue, seen):
-    """Share light from a direction, and how much of what is far away is seen there, among the nodes around: own (NODES, 4)."""
+    """Distribute light from a direction, and the visibility of the far background there, among the nodes around: own (NODES,
+    4).
+    """
     per = f4(1) / (abs(x) + abs(y) + abs(z))
     u, v = x * per, y * per
     if z < f4(0):
@@ -73,7 +75,8 @@ def add_view(own, fold, x, y, z, red, green, blue, seen):
 
 @njit
 def send_views(ids, turn, own, directions, patch_is_ground, sent, fold, views):
-    """Write the probes' views along rays into views (N, NODES, 4): the patches' light, and 1 where the sky or the ground is.
+    """Write the probes' views along rays into views (N, NODES, 4): the patches' light, and 1 if the ray reaches the sky or the
+    ground.
 
     Patches send `sent` (M, 3). Each node that `fold` (NODES,) names holds the sum over all rays. Other arguments as in
     `kernels_probes.send`.
@@ -90,7 +93,7 @@ def send_views(ids, turn, own, directions, patch_is_ground, sent, fold, views):
 
 @njit(_nrt=True)
 def spread_views(turn, own, directions, fold, views):
-    """Make sums over rays means, and give each direction's value to all of its nodes."""
+    """Divide sums over rays into means, and copy each direction's value to all of its nodes."""
     counts = np.zeros((directions.shape[0], NODES, 4), np.float32)
     for w in range(directions.shape[0]):
         for k in range(directions.shape[1]):
@@ -115,7 +118,7 @@ def _place(b):
     x, y = x * s, y * s
     u, v, is_down = 1 - size(y), 1 - size(x), z < 0
     u, v = (where(is_down, where(a >= 0, folded, -folded), a) for a, folded in ((x, u), (y, v)))
-    # NaN is taken as 0.
+    # NaN counts as 0.
     u, v = (least(most((a + 1) * ((SIDE - 1) / 2), 0), SIDE - 1) for a in (u, v))
     column, row = (least(a, SIDE - 2).whole().real() for a in (u, v))
     right, down = u - column, v - row
@@ -137,7 +140,8 @@ def _shared(weight, own):
 
 @inner(fastmath=FAST)
 def near_light(count, views, columns, layer, b):
-    """Rows PROBES on: light that things send from the direction T0 to T2, and how much they leave of what is behind them.
+    """Rows PROBES on: light that things send from the direction T0 to T2, and the share of the background that they leave
+    visible.
 
     views (cells * NODES, 4); columns, layer: probes in one; rows KEPT on: the eight probes around, see `kernels_bounce`.
     """
@@ -158,7 +162,7 @@ def near_light(count, views, columns, layer, b):
 
 @lanewise
 def add_near_light(b):
-    """T3 to T5, light from afar: what things leave of it, and their own light."""
+    """Update T3 to T5, light from afar: multiply it by the share that things leave visible, and add their own light."""
     inside, seen = b[INSIDE], b[PROBES, 3 * BLOCK]
     for k in range(0, 3 * BLOCK, BLOCK):
         b[T3 + k] = b[T3 + k] * (1 + (seen - 1) * inside) + b[PROBES, k] * inside

@@ -1,4 +1,4 @@
-"""Patches of the surfaces around probes: what rays hit, gathered where it is close together, of one material and side."""
+"""Patches of the surfaces around probes: ray hits grouped by place, material and side."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ from viewsphere.engines.raster.reflections.tracing import Tree
 from viewsphere.engines.raster.shadows.shadow_maps import Lights
 
 ROOM = 1 << 17
-"""Places in a table at first; it is doubled until all patches fill less than half of it."""
+"""Initial number of places in a table; it is doubled until all patches fill less than half of it."""
 
 
 class Table(NamedTuple):
-    """An open table of S places, and the first hits of up to S / 2 patches. keys (S,) uint64; patch (S,) int32, -1 for empty;
-    known (S / 2,) int32: how many hits are kept; triangle, far (S / 2, HITS); place, way, normal (S / 2, HITS, 3): where a hit
-    is, the ray's direction, and the side that the ray sees.
+    """An open-addressing table of S places, and the first hits of up to S / 2 patches. keys (S,) uint64; patch (S,) int32, -1
+    for empty; known (S / 2,) int32: the number of stored hits; triangle, far (S / 2, HITS); place, way, normal (S / 2, HITS,
+    3): the place of a hit, the ray's direction, and the normal on the side that the ray sees.
     """
 
     keys: NDArray[np.uint64]
@@ -34,8 +34,8 @@ class Table(NamedTuple):
 
 
 class Rays(NamedTuple):
-    """Rays from origins (N, 3) in the K directions (W, K, 3) of each origin's turn (N,), and what they met: triangles (K, N),
-    -1 for none, and how far.
+    """Rays from origins (N, 3) in the K directions (W, K, 3) of each origin's turn (N,), and their hits: triangles (K, N), -1
+    for none, and distances.
     """
 
     origins: Float32
@@ -46,7 +46,7 @@ class Rays(NamedTuple):
 
 
 class Lit(NamedTuple):
-    """The light that patches send by themselves.
+    """The light that patches emit or reflect directly.
 
     Its fields are reflectance (M, 3), emitted radiance (M, 3), and irradiance of lamps and sun (M, 3).
     """
@@ -58,14 +58,14 @@ class Lit(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Patches:
-    """M patches and their hits, as in `Table`; ids: of each bundle of rays, the patches that they hit (K, N) int32."""
+    """M patches and their hits, as in `Table`; ids: for each bundle of rays, the patches that they hit (K, N) int32."""
 
     table: Table
     count: int
     ids: tuple[Int32, ...]
 
     def trimmed(self) -> Patches:
-        """Without room for what further ones hit."""
+        """The patches without the room for further ones."""
         kept = {name: getattr(self.table, name)[: self.count].copy() for name in Table._fields[2:]}
         return Patches(self.table._replace(**kept), self.count, self.ids)
 
@@ -76,17 +76,17 @@ class Patches:
 
     @property
     def triangles(self) -> Int32:
-        """One triangle of each, (M,); negative on the ground."""
+        """One triangle of each patch, (M,); negative on the ground."""
         return self.table.triangle[: self.count, 0]
 
     @property
     def places(self) -> Float32:
-        """Their middles, (M, 3)."""
+        """The middles of the patches, (M, 3)."""
         return self._mean(self.table.place)
 
     @property
     def normals(self) -> Float32:
-        """(M, 3)."""
+        """The normals of the patches, (M, 3)."""
         mean = self._mean(self.table.normal)
         return mean / np.maximum(np.sqrt((mean * mean).sum(axis=1, keepdims=True)), np.float32(1e-6))
 
@@ -155,8 +155,8 @@ def patches_of(
     ground: Float32,
     begun: Patches | None = None,
 ) -> Patches:
-    """The patches that all these rays hit, in their order; `begun`: those of the first bundles, whose table is gone on with
-    and not theirs any more; other arguments as in `kernels_probes.patch`.
+    """The patches that all these rays hit, in their order. `begun` has the patches of the first bundles; its table is reused
+    and must not be used any more. Other arguments as in `kernels_probes.patch`.
     """
     done = begun or Patches(_empty(ROOM), 0, ())
     while True:

@@ -1,1 +1,1 @@
-"""Light of still surfaces, by texel and by vertex."""
+"""Light of still surfaces, stored per texel and per vertex."""

@@ -16,23 +16,23 @@ from viewsphere.kernels.lanes import FAST, lanewise
 f4 = nb.float32
 U = nb.uintp
 SKY = -1
-# Columns of a node: how much it counts; times that: light along the normal and along both axes, see `see`.
+# Columns of a node: its weight; then, multiplied by it, light along the normal and along both axes, see `see`.
 WEIGHT, ALONG, COLUMNS = 0, 1, 12
 # Columns of a chart: where a place is along both axes in cells, as factors of x, y, z and 1; the normal; its first node, and
 # how many nodes it has along both axes.
 ACROSS, UPWARD, NORMAL, FIRST, WIDE, HIGH, CHART = 0, 4, 8, 11, 12, 13, 16
 FACING = 0.5  # cosine between the normal of a chart and that of the side seen
-LEAST = 0.02  # weight of four nodes from which on they are read: probes know more of what is shut in
-STEEP = 0.2  # cosine from which on light along the axes is known
+LEAST = 0.02  # total weight of four nodes above which they are read: probes are better in enclosed places
+STEEP = 0.2  # cosine above which light along the axes is stored
 NEAR = 0.5  # cells
-INSIDE, SHUT = 0.5, 0.97  # shares of rays that meet an inner side, or anything near, from which on a node hardly counts
-HARDLY = 1e-3  # weight of nodes that see no light of their own: above 0, so that weights can be divided by their sum
+INSIDE, SHUT = 0.5, 0.97  # shares of rays that hit an inner side, or anything near, above which a node hardly counts
+HARDLY = 1e-3  # weight of nodes without light of their own: above 0, so that weights can be divided by their sum
 _blend = blend(COLUMNS)
 
 
 @njit(_nrt=True)
 def pieces(corners, count):
-    """Return the piece of each triangle, (T,): the least triangle that is connected to it by common corners (T, 3).
+    """Return the piece of each triangle, (T,): the lowest number among the triangles connected to it by common corners (T, 3).
 
     The corners' numbers are below `count`.
     """
@@ -54,7 +54,7 @@ def pieces(corners, count):
 
 @inner
 def _on_edge(px, py, ax, ay, bx, by):
-    """The place on an edge that is nearest to p."""
+    """The point on an edge that is nearest to p."""
     dx, dy = bx - ax, by - ay
     size = dx * dx + dy * dy
     t = min(max(((px - ax) * dx + (py - ay) * dy) / size, 0.0), 1.0) if size > 0 else 0.0
@@ -63,7 +63,7 @@ def _on_edge(px, py, ax, ay, bx, by):
 
 @inner
 def _nearest(px, py, t):
-    """The place in a triangle (3, 2) that is nearest to p."""
+    """The point in a triangle (3, 2) that is nearest to p."""
     signs = 0
     for k in range(3):
         a, b = t[k], t[(k + 1) % 3]
@@ -83,11 +83,11 @@ def _nearest(px, py, t):
 
 @inner
 def _shrink(t, inset):
-    """Move the corners of a triangle (3, 2) towards the middle of the circle within it, so that its edges move by `inset`."""
+    """Move the corners of a triangle (3, 2) towards the centre of its incircle, so that its edges move by `inset`."""
     around = area = x = y = 0.0
     for k in range(3):
         a, b, c = t[k], t[(k + 1) % 3], t[(k + 2) % 3]
-        size = np.sqrt((b[0] - c[0]) ** 2 + (b[1] - c[1]) ** 2)  # of the edge that is opposite to the corner
+        size = np.sqrt((b[0] - c[0]) ** 2 + (b[1] - c[1]) ** 2)  # length of the edge opposite to the corner
         around, x, y = around + size, x + size * a[0], y + size * a[1]
         area += (a[0] * b[1] - b[0] * a[1]) / 2
     part = min(inset * around / max(2 * abs(area), 1e-300), 1.0)
@@ -98,10 +98,10 @@ def _shrink(t, inset):
 
 @njit
 def settle(triangles, chart, charts, inset, places, distances):
-    """Write the place from which each node looks into places (N, 2), in cells.
+    """Write the place from which each node's rays start into places (N, 2), in cells.
 
     The place is the point of the node's chart that is nearest to the node, `inset` from the chart's border. distances (N,),
-    first infinite: the square of the distance to the place.
+    initially infinite: the square of the distance to the place.
 
     triangles (T, 3, 2): corners in cells, which are moved; chart (T,); charts: see `Lightmap`.
     """
@@ -121,7 +121,7 @@ def settle(triangles, chart, charts, inset, places, distances):
 
 @njit
 def count_in(met, far, directions, turn, normals, cell, is_inside_out, weights):
-    """Write the weight of each node into weights (N,): HARDLY for a node within a thing or in a narrow place, else 1.
+    """Write the weight of each node into weights (N,): HARDLY for a node within a thing or in a narrow place, otherwise 1.
 
     met, far (K, N), directions (W, K, 3), turn (N,): see `kernels_trace.cast`; normals (T, 3); cell: its size.
     """
@@ -141,9 +141,9 @@ def count_in(met, far, directions, turn, normals, cell, is_inside_out, weights):
 def see(ids, turn, local, sky, below, nodes):
     """Add the light of the sky (W, K, 3) and the distant ground (3,) to nodes (N, COLUMNS).
 
-    Light along the normal is the radiance of a white matt surface. A slightly tilted surface adds the light along both axes,
-    times its normal's parts along them. ids (K, N): patches that cosine-weighted rays meet. local (R, K, 3): directions in the
-    chart's axes, of each way to turn them, turn modulo R.
+    Light along the normal is the radiance of a white matt surface. For a slightly tilted surface, the light along both axes is
+    added, times the parts of its normal along them. ids (K, N): patches that cosine-weighted rays hit. local (R, K, 3):
+    directions in the chart's axes, for each rotation (turn modulo R).
     """
     turns = U(local.shape[0])
     per = f4(1) / f4(ids.shape[0])
@@ -161,7 +161,7 @@ def see(ids, turn, local, sky, below, nodes):
 
 @njit(fastmath=FAST)
 def receive(ids, turn, local, sent, weights, nodes):
-    """Add what comes from patches that send `sent` (M, 3) to nodes (N, COLUMNS), and weigh all by weights (N,); the others as
+    """Add the light of patches that send `sent` (M, 3) to nodes (N, COLUMNS), and multiply all by weights (N,); the others as
     in `see`.
     """
     turns = U(local.shape[0])
@@ -180,7 +180,7 @@ def receive(ids, turn, local, sent, weights, nodes):
 
 @inner(fastmath=FAST)
 def _add(node, x, y, z, r, g, b):
-    """Light from this direction, in the chart's axes: radiance that the normal has, of red, green and blue."""
+    """Add light from this direction, in the chart's axes, to a node: the radiance along the normal, in red, green and blue."""
     steep = f4(1) / max(z, f4(STEEP))
     x, y = x * steep, y * steep
     node[U(ALONG)] += r
@@ -196,8 +196,8 @@ def _add(node, x, y, z, r, g, b):
 
 @njit(_nrt=True)
 def shine_on(tree, places, turn, axes, turns, points, ids, far, local, froms, emitted, off, nodes):
-    """Add to nodes (N, COLUMNS) what arrives from emissive triangles (see `kernels_emissive`): from every `turns`-th point, and
-    along rays that hit emissive triangles close by. axes (W, 3, 3): rows are both axes and the normal; the others as in `see`.
+    """Add to nodes (N, COLUMNS) the light of emissive triangles (see `kernels_emissive`): from every `turns`-th point, and
+    along rays that hit nearby emissive triangles. axes (W, 3, 3): rows are both axes and the normal; the others as in `see`.
     """
     stack = np.empty((DEEP, 2), np.float32)
     per = f4(1) / f4(ids.shape[0])
@@ -221,7 +221,7 @@ def shine_on(tree, places, turn, axes, turns, points, ids, far, local, froms, em
 
 @njit
 def smooth(charts, nodes, out):
-    """Mix each node with the eight around it on its chart, into out (N, COLUMNS)."""
+    """Mix each node with its eight neighbours on its chart, into out (N, COLUMNS)."""
     for c in range(charts.shape[0]):
         wide, high, first = int(charts[c, WIDE]), int(charts[c, HIGH]), int(charts[c, FIRST])
         for y in range(high):
@@ -244,7 +244,7 @@ def forget_map(b):
 
 @inner(fastmath=FAST)
 def read_map(count, lightmap, own, b):
-    """Set GLOW, and MAPPED to 1, where the samples' triangles `own` have a chart that knows their light; else MAPPED to 0."""
+    """Set GLOW, and MAPPED to 1, if the chart of a sample's triangle (`own`) has its light; otherwise set MAPPED to 0."""
     nodes, charts = lightmap.nodes, lightmap.charts
     for i in range(U(count)):
         b[U(MAPPED) + i] = f4(0)

@@ -1,4 +1,4 @@
-"""Sites of light on surfaces that are not flat, and from them the light at points of these surfaces: see `vertex_light`."""
+"""Light sites on surfaces that are not flat, and the light that they give points of these surfaces: see `vertex_light`."""
 
 from __future__ import annotations
 
@@ -12,17 +12,17 @@ from viewsphere.kernels.lanes import FAST
 
 f4 = nb.float32
 U = nb.uintp
-LIKE = 0.3  # cosine between the normals of a point and of a site from which on the site counts
-ASIDE = 0.15  # part of a normal along an axis from which on sites that face along this axis are asked
-THICK = 0.5  # cells between the planes of a point and a site from which on the site hardly counts
-HARDLY = 1e-3  # least weight: above 0, so that weights can be divided by their sum
-SHUT = 0.5  # how many squared cells aside a part may be that is all open, instead of one that is all shut in
-STRAIGHT = 0.5  # cosine between a vertex' normal and that of its triangle from which on the triangle is round there
+LIKE = 0.3  # cosine between the normals of a point and of a site above which the site counts
+ASIDE = 0.15  # part of a normal along an axis above which sites that face along this axis are read
+THICK = 0.5  # cells between the planes of a point and a site above which the site hardly counts
+HARDLY = 1e-3  # minimum weight: above 0, so that weights can be divided by their sum
+SHUT = 0.5  # squared distance in cells that a fully open part may be farther away than a fully enclosed one
+STRAIGHT = 0.5  # cosine between a vertex' normal and its triangle's above which the triangle is round there
 
 
 @inner
 def _middle(corners, parts, row, k):
-    """The middle of part k of a row of a triangle (3, 3) that is cut in `parts` squared."""
+    """The middle of part k of a row of a triangle (3, 3) that is cut into `parts` squared parts."""
     per, third = 1.0 / parts, (1 + k % 2) / 3.0
     g, h = (k // 2 + third) * per, (row + third) * per
     x = corners[0, 0] + g * (corners[1, 0] - corners[0, 0]) + h * (corners[2, 0] - corners[0, 0])
@@ -33,7 +33,7 @@ def _middle(corners, parts, row, k):
 
 @inner
 def _key(x, y, z, side):
-    """One number for a cell, which may be one below the first, and one of six sides."""
+    """One number for a cell, whose index may be one below the first, and one of six sides."""
     key = np.uint64(side)
     for at in (x, y, z):
         key = key * np.uint64(1 << 20) + np.uint64(at + 1)
@@ -56,12 +56,13 @@ def _cell_key(x, y, z, normal, low, cells):
 
 @njit
 def group(corners, normals, parts, shares, low, cells, keys, sites, sums):
-    """Gather parts of triangles in sites: those in one cell that face along one axis. Returns how many sites there are, -1 if
-    there are more than sums has room for.
+    """Group parts of triangles into sites: parts in one cell that face along one axis. Return the number of sites, -1 if `sums`
+    is too small.
 
-    corners (T, 3, 3), normals (T, 3); parts (T,): in the square of how many each is cut; shares (T,): how open each is, 0 for
-    left out; low (3,): where the first of the cells is, of which there are `cells` in a length; keys (S,), sites (S,): an open
-    table, empty; sums (N, 7), zeros: how open the parts are, all in all, times their mean place, and their mean normal.
+    corners (T, 3, 3), normals (T, 3); parts (T,): each triangle is cut into the square of this number; shares (T,): how open
+    each is, 0 to leave it out; low (3,): the corner of the first cell, with `cells` in a length; keys (S,), sites (S,): an
+    empty open-addressing table; sums (N, 7), zeros: the total openness of the parts, and, multiplied by it, their mean place
+    and mean normal.
     """
     count = 0
     for t in range(parts.shape[0]):
@@ -90,7 +91,7 @@ def group(corners, normals, parts, shares, low, cells, keys, sites, sums):
 def settle(corners, normals, parts, shares, low, cells, keys, sites, sums, best, places, facing):
     """Write the place and the normal of each site into places, facing (N, 3).
 
-    They are those of the triangle's part that is most like all parts of the site. best (N,): infinite; the other arrays as
+    They are those of the triangle part that is most similar to all parts of the site. best (N,): infinite; the other arrays as
     `group` left them.
     """
     for t in range(parts.shape[0]):
@@ -113,7 +114,7 @@ def settle(corners, normals, parts, shares, low, cells, keys, sites, sums, best,
 
 @inner
 def _is_round(vertex, normal):
-    """Return whether a triangle of this normal is shaded by this vertex' normal."""
+    """Return whether the vertex' normal is used to shade a triangle with this normal."""
     along = vertex[0] * normal[0] + vertex[1] * normal[1] + vertex[2] * normal[2]
     size = vertex[0] * vertex[0] + vertex[1] * vertex[1] + vertex[2] * vertex[2]
     return size > f4(0.5) and size < f4(2) and along > f4(STRAIGHT)
@@ -121,7 +122,7 @@ def _is_round(vertex, normal):
 
 @inner
 def _lay_point(at, corners, smooth, normal, g, h, places, facing):
-    """A point of a triangle, into row `at` of places and facing."""
+    """Write a point of a triangle into row `at` of places and facing."""
     for c in range(3):
         places[at, c] = corners[0, c] + g * (corners[1, c] - corners[0, c]) + h * (corners[2, c] - corners[0, c])
         facing[at, c] = smooth[0, c] + g * (smooth[1, c] - smooth[0, c]) + h * (smooth[2, c] - smooth[0, c])
@@ -132,11 +133,11 @@ def _lay_point(at, corners, smooth, normal, g, h, places, facing):
 
 @njit(_nrt=True)
 def lay(triangles, corners, smooth, normals, parts, numbers, index, places, facing):
-    """The points of which triangles know the light, into places and facing (P, 3); returns how many there are.
+    """Write the points at which triangles store light into places and facing (P, 3); return the number of points.
 
-    A triangle that is cut has points of its own, at all corners of its parts; the others share vertices, if they are round
-    there. triangles (T, 3): vertices; smooth (T, 3, 3): their normals; numbers (V,): -1; index (I,): which points those of
-    each triangle are, row by row; the others as in `group`.
+    A cut triangle has its own points, at all corners of its parts; the others share vertices if they are round there. triangles
+    (T, 3): vertices; smooth (T, 3, 3): their normals; numbers (V,): -1; index (I,): the points of each triangle, row by row;
+    the others as in `group`.
     """
     count, done, own = 0, 0, np.empty((3, 3), np.float32)
     for t in range(parts.shape[0]):
@@ -163,14 +164,14 @@ def lay(triangles, corners, smooth, normals, parts, numbers, index, places, faci
 
 @inner(fastmath=FAST)
 def _share(dx, dy, dz, n, m, cells):
-    """Return the weight of a site with normal m for a point with normal n, at any distance along their planes.
+    """Return the weight of a site with normal m for a point with normal n. Distance along their planes does not count.
 
     dx, dy, dz: from the point to the site.
     """
     like = n[0] * m[0] + n[1] * m[1] + n[2] * m[2] - f4(LIKE)
     if like <= f4(0):
         return f4(0)
-    # Across the planes of both: places on one ball, or any other round thing, are on one plane.
+    # Across the planes of both: places on one ball, or another round thing, count as one plane.
     off = (dx * (n[0] + m[0]) + dy * (n[1] + m[1]) + dz * (n[2] + m[2])) * f4(0.5 / THICK) * cells
     return like * like * (max(f4(1) - off * off, f4(0)) + f4(HARDLY))
 
@@ -183,8 +184,8 @@ def _add(node, share, own):
 
 @njit(fastmath=FAST)
 def spread(places, normals, low, cells, keys, sites, site_places, site_normals, nodes, out):
-    """The light of points (P, 3) with these normals, into out (P, COLUMNS): the mean of that of the sites around, nodes
-    (N, COLUMNS), zeros where there are none. low (3,), cells: float32; the others as `settle` left them.
+    """Write the light of points (P, 3) with these normals into out (P, COLUMNS): the mean light of the sites around, from nodes
+    (N, COLUMNS), zeros if there are none. low (3,), cells: float32; the others as `settle` left them.
     """
     for i in range(U(places.shape[0])):
         p, n, own, total = places[i], normals[i], out[i], f4(0)

@@ -1,4 +1,6 @@
-"""Open tables: where a key is, in an array of keys and one of what they stand for, which is negative where there is none."""
+"""Open-addressing tables: the place of a key in an array of keys and an array of values; the value of an empty place is
+negative.
+"""
 
 from __future__ import annotations
 
@@ -11,7 +13,7 @@ GOLDEN = np.uint64(0x9E3779B97F4A7C15)
 
 @inner
 def found(key, keys, values):
-    """The place of a key in a table, whose size is a power of two: its own, or the empty one where it belongs."""
+    """The place of a key in a table whose size is a power of two: its own, or the empty place for it."""
     last = np.uint64(len(keys) - 1)
     at = (key * GOLDEN) >> np.uint64(20) & last
     while values[at] >= 0 and keys[at] != key:

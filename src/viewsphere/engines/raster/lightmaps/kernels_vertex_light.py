@@ -12,15 +12,15 @@ from viewsphere.kernels.lanes import FAST
 
 f4 = nb.float32
 U = nb.uintp
-# Columns of a facet: its normal, in the square of how many parts it is cut, and where its points begin.
+# Columns of a facet: its normal, the number whose square is its number of parts, and the index of its first point.
 PARTS, FIRST, FACET = 3, 4, 5
-NONE = -1  # from which on downwards `Lightmap.chart` stands for facets: the first is one less
+NONE = -1  # numbers below this in `Lightmap.chart` are facets: the first is one less
 _blend = blend(COLUMNS)
 
 
 @inner(fastmath=FAST)
 def read_vertices(count, lightmap, own, b):
-    """Set GLOW, and MAPPED to 1, where the samples' triangles `own` are facets whose points know their light."""
+    """Set GLOW, and MAPPED to 1, if a sample's triangle (`own`) is a facet whose points have its light."""
     facets, knots, points = lightmap.facets, lightmap.knots, lightmap.points
     for i in range(U(count)):
         at = lightmap.chart[U(own[i])] if own[i] >= 0 else nb.int32(NONE)

@@ -1,6 +1,7 @@
-"""Charts of flat, still surfaces, and from where on them light is gathered: walls, floors, table tops, doors, facades.
+"""Charts of flat, still surfaces, and the nodes on them that gather light: walls, floors, table tops, doors, facades.
 
-Probes are some way off a wall, and read light that falls off with distance along straight lines; a wall's own rays do neither.
+Probes are some distance from a wall, and read light that falls off with distance along straight lines. A wall's own rays avoid
+both.
 """
 
 from __future__ import annotations
@@ -19,30 +20,34 @@ from viewsphere.engines.raster.records import Float32, Int32
 Float = NDArray[np.float64]
 
 CELL, MOST = 0.1, 64_000
-"""Metres between nodes at least, and how many there are at most."""
+"""Minimum distance between nodes in metres, and maximum number of nodes."""
 
 LEAST, NARROW = 0.05, 0.05
-"""Square metres that a chart has at least, and metres that it is wide: twice its area by the length of its border."""
+"""Minimum area of a chart in square metres, and its minimum width in metres: twice its area divided by the length of its
+border.
+"""
 
 ROOM = 1 << 25
-"""Rays of all nodes at most, each of which takes twelve bytes. A direction counts as four: there are many where charts face
-many ways.
+"""Maximum number of rays of all nodes, each of which takes twelve bytes. A direction counts as four rays, because charts that
+face many ways need many directions.
 """
 
 TURNS = 4
-"""The rays of a node are turned in the square of so many ways: any four by four nodes have all."""
+"""Square root of the number of rotations of a node's rays: any four by four nodes have all of them."""
 
 PLANES, APART = 400.0, 0.004
-"""Normals of one chart are equal in steps of this part of their length; the triangles' planes in steps of so many metres."""
+"""Resolution at which normals of one chart are equal, in steps per length; step in metres at which the planes of its triangles
+are equal.
+"""
 
 SAME = 1e-3
-"""Metres: corners are the same in steps of so many."""
+"""Step in metres at which corners count as equal."""
 
 NEAR = 2.0
-"""The square of the cells between a node that is read and its chart, at most."""
+"""Maximum squared distance, in cells, between a node that is read and its chart."""
 
 INSET, OFF = 0.05, 1e-3
-"""Cells from a chart's border, and off the surface, from where nodes look."""
+"""Distance of the nodes' ray origins from a chart's border, in cells, and off the surface."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,8 +62,8 @@ class Chart:
 class Charts:
     """The part of the lightmaps that depends on no light.
 
-    charts, chart: see `Lightmap`, of the bounce scene's own triangles; origins (N, 3), turn (N,): of the nodes' rays in
-    directions (W, K, 3), which are `local` (R, K, 3) in axes (W, 3, 3) of the charts; reached (N,): whether the node is near
+    charts, chart: see `Lightmap`, for the bounce scene's own triangles. origins (N, 3), turn (N,): those of the nodes' rays in
+    directions (W, K, 3), which are `local` (R, K, 3) in axes (W, 3, 3) of the charts. reached (N,): whether the node is near
     the chart's triangles, so that some point reads it.
     """
 
@@ -74,7 +79,9 @@ class Charts:
 
 
 def charts_of(corners: Float32, unit: float, rays: int) -> Charts | None:
-    """The charts of triangles (T, 3, 3) in a stage of `unit` metres, None if there are none. rays: of each node at most."""
+    """The charts of triangles (T, 3, 3) in a stage of `unit` metres, None if there are none. rays: maximum number of rays per
+    node.
+    """
     places = corners.astype(np.float64)
     found = [piece for chart in _planes(places, unit) for piece in _pieces(chart, places, unit)]
     if not found:
@@ -87,13 +94,13 @@ def charts_of(corners: Float32, unit: float, rays: int) -> Charts | None:
 
 
 def _nodes(boxes: Float, cells: float) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """The first node of charts in boxes (C, 2, 2), and how many nodes they have, along both axes, (C, 2)."""
+    """The first node of each chart in boxes (C, 2, 2), and the numbers of its nodes along both axes, (C, 2)."""
     low, high = np.floor(boxes[:, 0] * cells), np.ceil(boxes[:, 1] * cells)
     return low.astype(np.int64), (np.maximum(high - low, 1) + 1).astype(np.int64)
 
 
 def has_planes(corners: Float32, unit: float) -> bool:
-    """Return whether any of these triangles (T, 3, 3) lie in a plane that is wide enough for a chart."""
+    """Return whether some of these triangles (T, 3, 3) form a plane that is wide enough for a chart."""
     return next(_planes(corners.astype(np.float64), unit), None) is not None
 
 
@@ -118,15 +125,15 @@ def _planes(corners: Float, unit: float) -> Iterator[Chart]:
 
 
 def _axes(normal: Float) -> Float:
-    """Axes (3, 3) of a plane, the normal last; the first is level unless the plane is."""
+    """Axes (3, 3) of a plane, the normal last; the first axis is horizontal unless the plane is."""
     across = np.cross([0.0, 0.0, 1.0] if abs(normal[2]) < 0.9 else [0.0, 1.0, 0.0], normal)
     across /= math.sqrt(float(across @ across))
     return np.stack([across, np.cross(normal, across), normal])
 
 
 def _pieces(chart: Chart, corners: Float, unit: float) -> Iterator[Chart]:
-    """The chart's parts that hang together by common corners, if they are wide: what lies beyond a wall has light of its own,
-    and of a narrow strip half may lie within a wall.
+    """The chart's parts that are connected by common corners, if they are wide. Surfaces beyond a wall have light of their own,
+    and half of a narrow strip may be inside a wall.
     """
     flat = corners[chart.triangles] @ chart.axes[:2].T * unit
     steps = np.rint(flat.reshape(-1, 2) / SAME).astype(np.int64)

@@ -1,7 +1,7 @@
 """Light of still curved surfaces, at the vertices of their triangles and at more points on large ones.
 
 Mesh colours (Yuksel, Keyser and House 2010), with fewer rays. Light is gathered at sites: each cell has one for each of six
-directions that its surfaces face. A point has the mean of the sites around it that face the same way.
+directions that its surfaces face. The light of a point is the mean of the sites around it that face the same way.
 """
 
 from __future__ import annotations
@@ -22,22 +22,22 @@ from viewsphere.engines.raster.reflections.tracing import Tree, cast
 Float = NDArray[np.float64]
 
 CELL, MOST = 0.06, 16_000
-"""Metres along a cell at least, and how many sites there are at most."""
+"""Minimum size of a cell in metres, and maximum number of sites."""
 
 ROOM = 1 << 16
 """Places in the table of sites."""
 
 WAYS = 16
-"""In which rays of sites are turned."""
+"""Number of rotations of the rays of sites."""
 
 LONG, MOST_PARTS = 1.25, 32
-"""Cells between points along the edges of triangles, at most, and how many parts of an edge there are at most."""
+"""Maximum distance, in cells, between points along the edges of triangles, and maximum number of parts of an edge."""
 
 OFF = 5e-4
-"""Metres off the surface from where sites look."""
+"""Distance of the sites' ray origins off the surface, in metres."""
 
 NEAR, NEAR_RAYS = 1.5, 16
-"""Cells within which a point itself looks for what is in its way, and with how many rays."""
+"""Distance in cells within which a point tests for blocking surfaces itself, and the number of rays for this."""
 
 THROWN_BACK = 0.3
 """Light that near surfaces reflect, as a share of the light that they block."""
@@ -45,7 +45,7 @@ THROWN_BACK = 0.3
 
 @dataclass(frozen=True, eq=False)
 class Sites:
-    """The part of the light at sites that depends on no light.
+    """The part of the light at sites that does not depend on light.
 
     low (3,): the lowest corner of the cells; keys, sites: their table; places, normals (N, 3): see `kernels_sites.settle`;
     origins (N, 3), and directions (N, K, 3) of their rays, which are `local` (R, K, 3), site by site, in axes (N, 3, 3).
@@ -63,12 +63,14 @@ class Sites:
     axes: Float32
 
     def light_at(self, facets: Facets, nodes: Float32, open_: Float32) -> Float32:
-        """The mean of the sites' light, (P, 12), at the facets' points, as far as these are open. nodes (N, 12): as
-        `kernels_lightmap.see` has them; light of the result is along x, y and z instead. open_ (N,): how open the sites are.
+        """The mean light of the sites, (P, 12), at the facets' points, multiplied by the openness of these.
+
+        nodes (N, 12): as in `kernels_lightmap.see`; light of the result is along x, y and z instead. open_ (N,): the openness
+        of the sites.
         """
         along = nodes[:, ALONG : ALONG + 9].reshape(-1, 3, 3)[:, [1, 2, 0]]  # along both axes, and along the normal
         turned = np.zeros_like(nodes)
-        turned[:, WEIGHT] = nodes[:, WEIGHT] * open_  # what is read is divided by it
+        turned[:, WEIGHT] = nodes[:, WEIGHT] * open_  # the value that is read is divided by it
         turned[:, ALONG : ALONG + 9] = np.matmul(self.axes.transpose(0, 2, 1), along).reshape(-1, 9)
         light = np.empty((len(facets.places), COLUMNS), np.float32)
         table = self.keys, self.sites, self.places, self.normals
@@ -79,8 +81,8 @@ class Sites:
 
 @dataclass(frozen=True, eq=False)
 class Facets:
-    """Triangles whose light is known at points. facets (F, 5), knots (I,): see `Lightmap`; which (F,): of the bounce scene's
-    triangles; places, normals (P, 3): of the points; open (P,): see `openness`.
+    """Triangles whose light is stored at points. facets (F, 5), knots (I,): see `Lightmap`; which (F,): their numbers among the
+    bounce scene's triangles; places, normals (P, 3): those of the points; open (P,): see `openness`.
     """
 
     facets: Float32
@@ -94,8 +96,8 @@ class Facets:
 def openness(far: Float32, reach: float) -> Float32:
     """Return the share (N,) of the light from beyond `reach` that arrives at N places.
 
-    The share includes the light that nearer things throw back. far (K, N): the distances of the hits of rays as dense as their
-    cosine to the surface.
+    The share includes the light that nearer things reflect. far (K, N): the distances of the hits of rays whose density is
+    proportional to their cosine to the surface.
     """
     return (THROWN_BACK + (1 - THROWN_BACK) * (far > reach).mean(axis=0)).astype(np.float32)
 
@@ -110,8 +112,10 @@ def vertex_light_of(
     rays: int,
     is_inside_out: bool = False,
 ) -> tuple[Sites, Facets] | None:
-    """Of some of the triangles (T, 3), `which` (N,), in a stage of `unit` metres; None if none of them has an area, or all are
-    within things. tree: of all triangles; vertices: see `Surfaces`; normals (T, 3).
+    """The sites and facets of the triangles `which` (N,) among (T, 3), in a stage of `unit` metres. None if none of them has an
+    area, or all are within things.
+
+    tree: the tree of all triangles; vertices: see `Surfaces`; normals (T, 3).
     """
     corners = vertices[triangles[which], 11:14]
     edges = np.roll(corners, -1, axis=1) - corners
@@ -140,9 +144,9 @@ def vertex_light_of(
 
 @dataclass(frozen=True, eq=False)
 class _Grid:
-    """The smallest cells, of a size at least, in which there are few enough sites.
+    """The smallest cells, not below a minimum size, that give few enough sites.
 
-    low (3,): where they begin; parts (T,): in the square of how many each triangle is cut for them.
+    low (3,): the corner of the first cell; parts (T,): each triangle is cut into the square of this number for these cells.
     """
 
     low: Float32
@@ -160,13 +164,13 @@ class _Grid:
             cell *= 1.1
 
     def _group(self, corners: Float32, normals: Float32, shares: Float) -> tuple[int, NDArray[np.uint64], Int32, Float]:
-        """See `kernels_sites.group`."""
+        """The result of `kernels_sites.group`."""
         keys, sites, sums = np.zeros(ROOM, np.uint64), np.full(ROOM, -1, np.int32), np.zeros((MOST, 7))
         cells = np.float32(1 / self.cell)
         return kernels.group(corners, normals, self.parts, shares, self.low, cells, keys, sites, sums), keys, sites, sums
 
     def sites(self, corners: Float32, normals: Float32, shares: Float, unit: float, rays: int) -> Sites:
-        """The sites of triangles that are so open, (T,), with this many rays each."""
+        """The sites of triangles with this openness, (T,), with this many rays each."""
         count, keys, sites, sums = self._group(corners, normals, shares)
         best, places, facing = np.full(count, np.inf), np.empty((count, 3), np.float32), np.empty((count, 3), np.float32)
         cells = np.float32(1 / self.cell)
@@ -213,7 +217,7 @@ def _facets(
 
 
 def numbered(chart: Int32, facets: Facets) -> Int32:
-    """The charts of a bounce scene's triangles, with the numbers of facets where there are any: see `Lightmap`."""
+    """The charts of a bounce scene's triangles, combined with the numbers of facets, if there are any: see `Lightmap`."""
     chart = chart.copy()
     chart[facets.which] = NONE - 1 - np.arange(len(facets.which), dtype=np.int32)
     return chart

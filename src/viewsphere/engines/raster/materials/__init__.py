@@ -1,1 +1,1 @@
-"""Surfaces, their textures and mips, as kernels read them."""
+"""Surfaces, their textures and mips, in the form that kernels read."""

@@ -1,5 +1,5 @@
-"""Pack the textures of all materials as bundles: textures of one material that share size, coordinates and wrapping are stored
-together, texel by texel, so that one look-up reads all of them.
+"""The textures of all materials packed as bundles. Textures of one material that share size, coordinates and wrapping are
+stored together, texel by texel, so that one look-up reads all of them.
 """
 
 from __future__ import annotations
@@ -25,14 +25,14 @@ from viewsphere.engines.raster.records import Int32, Textures
 Words = NDArray[np.uint16]
 
 MOST = 12
-"""Bundles that a material has at most: one for each of its textures."""
+"""Maximum number of bundles of a material: one for each of its textures."""
 LEVELS = 16
 SHARPEST = 4096
 """Longest side, in texels, at which a texture is kept; larger textures are reduced by a whole factor."""
 MOST_WORDS = 1 << 28
-"""Words (uint16) that the bundles of a stage have at most, half a gigabyte: beyond that the largest bundles are reduced."""
+"""Maximum number of words (uint16) in the bundles of a stage, half a gigabyte; above it, the largest bundles are reduced."""
 KEPT_BYTES = 1 << 27
-"""Bytes of texels that are kept for the next stage, which often shows the same model."""
+"""Bytes of texels that are cached for the next stage, which often shows the same model."""
 
 
 @dataclass(frozen=True)
@@ -59,12 +59,14 @@ USES = {
     "clearcoat_roughness_texture": _Use(SPECULAR_COLOR, ((1, 3),)),
     "clearcoat_normal_texture": _Use(COAT_BUMP, is_normal=True),
 }
-"""The texture fields of `Material`, and which channels of each are kept (glTF 2.0, section 3.9, and its extensions)."""
+"""The texture fields of `Material`, and the channels of each that are kept (glTF 2.0, section 3.9, and its extensions)."""
 
 
 @dataclass(frozen=True)
 class _Content:
-    """The content of a bundle: images and the material's fields that use them. If `weighted`, colours count by their alpha."""
+    """The content of a bundle: images and the material's fields that use them. If `weighted`, colours are weighted by their
+    alpha.
+    """
 
     uses: tuple[tuple[Image, str], ...]
     weighted: bool
@@ -104,7 +106,7 @@ class BundlePacker:
     _slots: dict[tuple[_Content, Texture], int] = field(default_factory=dict[tuple[_Content, Texture], int])
 
     def add(self, material: Material, images: Sequence[Image], has_uv: tuple[bool, bool]) -> list[int]:
-        """Indices of the material's bundles, MOST of them, -1 after the last; textures without coordinates are left out."""
+        """Indices of the material's bundles, padded to MOST of them with -1; textures without coordinates are left out."""
         groups: dict[tuple[tuple[int, ...], Texture], list[tuple[Image, str]]] = {}
         for name in USES:
             texture: Texture | None = getattr(material, name)
@@ -168,19 +170,19 @@ def _affordable(contents: Iterable[_Content]) -> dict[_Content, _Content]:
 
 
 def _firsts(contents: Iterable[_Content]) -> list[int]:
-    """Each content's first word where all contents are stored one behind the other."""
+    """The first word of each content if all contents are stored one after another."""
     return list(accumulate((content.words for content in contents), initial=0))[:-1]
 
 
 class _Kept:
-    """Texels of former stages: of the latest, up to KEPT_BYTES of them, and of every stage that is still in use."""
+    """Texels of earlier stages: up to KEPT_BYTES of the latest ones, and those of every stage that is still in use."""
 
     def __init__(self) -> None:
         self._last: OrderedDict[tuple[_Content, ...], Words] = OrderedDict()
         self._held: WeakValueDictionary[tuple[_Content, ...], Words] = WeakValueDictionary()
 
     def get(self, contents: tuple[_Content, ...]) -> Words:
-        """Return the levels of these contents, one behind the other, with room at the end to read PLANES planes at once."""
+        """Return the levels of these contents, one after another, with room at the end to read PLANES planes at once."""
         texels = self._held.get(contents)
         if texels is None:
             texels = self._held[contents] = self._packed(contents)
@@ -216,7 +218,7 @@ def _kept() -> _Kept:
 
 @cache
 def _tables() -> tuple[Words, Words]:
-    """The words (uint16) of the 256 byte values: bytes that are plain numbers, and bytes that are sRGB, as linear light."""
+    """The words (uint16) of the 256 byte values: one table for plain numbers, and one that converts sRGB to linear light."""
     return np.arange(256, dtype=np.uint16) * np.uint16(257), np.round(linear(np.arange(256) / 255) * 65535).astype(np.uint16)
 
 

@@ -1,8 +1,8 @@
 """Filtered look-ups in bundles of textures: the part of a texture that a pixel covers, and the mean over that part.
 
-A pixel's footprint is an ellipse. One to eight trilinear probes stand along its longer axis, at the mip level that suits its
-shorter axis (Schilling, Knittel and Strasser, Texram, 1996). Work is done in chunks of samples: first all places in memory,
-which are fetched early where the texture is large, then the sums.
+A pixel's footprint is an ellipse. One to eight trilinear probes are placed along its longer axis, at the mip level that suits
+its shorter axis (Schilling, Knittel and Strasser, Texram, 1996). Work is done in chunks of samples: first all places in memory,
+which are prefetched if the texture is large, then the sums.
 """
 
 from __future__ import annotations
@@ -37,13 +37,13 @@ i4 = nb.int32
 u4 = nb.uint32
 U = nb.uintp
 
-REPEAT, CLAMP, MIRROR = 0, 1, 2  # what lies beyond a picture's edge
+REPEAT, CLAMP, MIRROR = 0, 1, 2  # the content beyond a picture's edge
 
 CHUNK = 32
-PROBES = 8  # most probes along a footprint's longer axis
+PROBES = 8  # maximum number of probes along a footprint's longer axis
 SPACING = 0.8  # probes per width of the footprint: a trilinear probe is wider than its level's texel
-SNAP = 0.2  # of a mip level: as near as that to one level, the next level is not read
-QUADS = CHUNK * PROBES * 2 + 8  # and room for what is written beyond the last quad
+SNAP = 0.2  # fraction of a mip level: closer to one level than this, the next level is not read
+QUADS = CHUNK * PROBES * 2 + 8  # and room for values written beyond the last quad
 PLANES = 3  # planes that are summed at once
 NEAR = 1 << 18  # words of a mip level that still fits into the processor's caches
 
@@ -139,8 +139,8 @@ def footprints(width, height, c):
 
 @lanewise
 def _choose_levels(last, c):
-    """Rows LOW, SHARE and NEXT_SHARE, and the coordinates of each sample's first probe. One mip level alone is read where the
-    other one would hardly count.
+    """Rows LOW, SHARE and NEXT_SHARE, and the coordinates of each sample's first probe. Only one mip level is read if the other
+    one would hardly count.
     """
     level, probes = least(c[LEVEL], last), c[COUNT]
     low = level.whole().real()
@@ -170,9 +170,10 @@ def _pair(typing, array, at, first, second):
 
 @inner(fastmath=FAST)
 def _lay_out(count, levels, c, q, places):
-    """Lay out every probe's quads: coordinates, share, level; the quads of sample i begin at FIRST + i. Returns their number.
+    """Lay out every probe's quads: coordinates, share, level; the quads of sample i begin at FIRST + i. Return the number of
+    quads.
 
-    Quads of both mip levels are always written; where one level will do, the next probe's quad overwrites the second one.
+    Quads of both mip levels are always written; if one level is enough, the next probe's quad overwrites the second one.
     """
     n = U(0)
     for i in range(U(count)):
@@ -266,7 +267,8 @@ def mix(texels, count, first_plane, planes, q, places, c):
 
 @inner(fastmath=FAST)
 def opacity(surfaces, textures, m, u0, v0, u1, v1):
-    """Alpha of a material's base colour texture at coordinates in both uv sets: that of the nearest texel, as for labels."""
+    """Alpha of a material's base colour texture at coordinates in both uv sets: the alpha of the nearest texel, as for labels.
+    """
     for n in range(U(surfaces.bundles.shape[1])):
         if surfaces.bundles[m, n] < 0:
             break
@@ -285,7 +287,7 @@ def opacity(surfaces, textures, m, u0, v0, u1, v1):
 
 @inner(fastmath=FAST)
 def _nearest(x, size, wrap):
-    """The texel that a coordinate lies in."""
+    """The texel that contains a coordinate."""
     if wrap == REPEAT:
         x = x - f4(math.floor(x))
     elif wrap != CLAMP:

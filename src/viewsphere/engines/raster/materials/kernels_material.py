@@ -106,7 +106,9 @@ SECOND_SET = U1 - U0  # from a row of the first uv set to that of the second
 
 @inner(fastmath=FAST, _nrt=True)
 def look_up(count, view, surfaces, textures, b, which):
-    """`material` as factors and textures say, whose products may still leave their ranges; normals of any length."""
+    """The values of `material` from factors and textures. Their products may still be out of range, and normals have any
+    length.
+    """
     c = np.empty(CHUNK_ROWS * CHUNK, np.float32)
     q = np.empty(QUAD_ROWS * QUADS, np.float32)
     places = np.empty(PLACE_ROWS * QUADS, np.int32)
@@ -144,7 +146,7 @@ def look_up(count, view, surfaces, textures, b, which):
 
 @inner(fastmath=FAST, _nrt=True)
 def material(count, view, surfaces, textures, b, which):
-    """Fill the rows that say what the samples are made of; smooth normals become those of the normal maps.
+    """Fill the rows of the samples' material; smooth normals are replaced by those of the normal maps.
 
     `which` are the samples' materials. Reads rows V, N, PIXEL, uv, vertex colour in RED to ALPHA, and AX to SIDE if textured.
     """
@@ -187,7 +189,7 @@ def _barycentric_motion(rotation, is_lens, b, c):
     g, h = cross(second, v), cross(v, first)
     volume = dot(first, g)
     scale = b[PIXEL] * volume / most(volume * volume, 1e-36)
-    # Across a lens's ray any two perpendicular directions will do, as its pixels are about round there (Duff et al. 2017).
+    # Across a lens's ray, any two perpendicular directions work, because its pixels are nearly round there (Duff et al. 2017).
     x, y, z = v
     s = sign(z)
     k = -1 / (s + z)
@@ -237,7 +239,7 @@ def _apply(count, plane, mode, look, c, b):
 
 @lanewise(exact=True)
 def _multiply(row, last, share, at, c, b):
-    """Multiply three rows by three channels, and a fourth row by the fourth channel as far as `share` says."""
+    """Multiply three rows by three channels, and a fourth row by the fourth channel, weighted by `share`."""
     for k in range(3):
         b[row, k * BLOCK] = b[row, k * BLOCK] * (c[at, k * CHUNK] * (1 / 65535))
     b[last] = b[last] * (1 + (c[at, 3 * CHUNK] * (1 / 65535) - 1) * share)
@@ -259,10 +261,10 @@ def _occlude(share, at, c, b):
 
 @lanewise(exact=True)
 def _bump(strength, widening, coat, at, c, b):
-    """Turn the normals as a normal map says: x along u, y against v (up in the image), also where the uv are mirrored; normals
-    stay where the uv are degenerate. coat: CX - NX for the coat's normals, else 0.
+    """Turn the normals by a normal map: x along u, y against v (up in the image), also if the uv are mirrored. Normals are
+    unchanged if the uv are degenerate. coat: CX - NX for the coat's normals, otherwise 0.
 
-    The more normals differ, the shorter is their mean: bumps too small to see become roughness (Toksvig 2005; here by adding
+    The more normals differ, the shorter is their mean, so bumps too small to see become roughness (Toksvig 2005; here by adding
     the inverse concentrations of von Mises-Fisher lobes, Banerjee et al. 2005).
     """
     p, q, z = ((c[at, k * CHUNK] - 32768) * (1 / 32767) for k in range(3))
@@ -292,7 +294,7 @@ def _bump(strength, widening, coat, at, c, b):
 
 
 def _seen(normal, v):
-    """The unit normal; one that looks away from the viewer, and would be black, is turned until it is seen edge on."""
+    """The unit normal; a normal that faces away from the viewer, and would be black, is turned until it is edge-on."""
     scale = 1 / root(dot(normal, normal) + 1e-20)
     normal = tuple(x * scale for x in normal)
     away = most(0.01 - dot(normal, v), 0)
@@ -303,7 +305,7 @@ def _seen(normal, v):
 
 @lanewise
 def _finish(b):
-    """Unit normals that face the viewer, roughness with that of small bumps, reflectance and transmission of the mixture."""
+    """Unit normals that face the viewer, roughness including small bumps, reflectance and transmission of the mixture."""
     v = b.get(VX, VY, VZ)
     for rows in ((NX, NY, NZ), (CX, CY, CZ)):
         b.put(rows, _seen(b.get(*rows), v))

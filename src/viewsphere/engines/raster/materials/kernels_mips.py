@@ -1,4 +1,4 @@
-"""Fill the interleaved texels of a texture's sharpest level, and make the smaller mip levels by halving."""
+"""Kernels that fill the interleaved texels of a texture's sharpest level, and make the smaller mip levels by halving."""
 
 from __future__ import annotations
 
@@ -10,12 +10,14 @@ from viewsphere.kernels.jit import inner, njit
 
 f4 = nb.float32
 U = nb.uintp
-ZERO_NORMAL = 32768.0  # the word that stands for 0 in a normal's component; 65,535 stands for 1
+ZERO_NORMAL = 32768.0  # the word for 0 in a normal's component; 65,535 is 1
 
 
 @njit
 def fill(texels, channel, pixels, source, table, factor):
-    """Put a channel of an image (H, W, 4) uint8 into uint16 texels, by a table of 256 words: means of `factor` squares."""
+    """Put a channel of an image (H, W, 4) uint8 into uint16 texels, converted by a table of 256 words: means of `factor` x
+    `factor` squares.
+    """
     for y in range(texels.shape[0]):
         for x in range(texels.shape[1]):
             if factor == 1:
@@ -31,7 +33,7 @@ def fill(texels, channel, pixels, source, table, factor):
 
 @njit
 def fill_normals(texels, channel, pixels, factor):
-    """Put an image's unit normals into three channels, each the mean of a factor x factor square; black texels are level."""
+    """Put an image's unit normals into three channels, each the mean of a factor x factor square; black texels are flat."""
     for y in range(texels.shape[0]):
         for x in range(texels.shape[1]):
             if factor == 1:
@@ -54,7 +56,7 @@ def _put_normal(texels, y, x, channel, direction, scale):
 
 @inner
 def _direction(red, green, blue):
-    """The unit vector of a normal map's texel; black, as between an atlas's islands, is level. 127 and 128 both mean 0."""
+    """The unit vector of a normal map's texel; black, as between an atlas's islands, is flat. Both 127 and 128 mean 0."""
     a, b, c = f4(red) * f4(2 / 255) - f4(1), f4(green) * f4(2 / 255) - f4(1), max(f4(blue) * f4(2 / 255) - f4(1), f4(0))
     a = f4(0) if abs(a) < f4(0.004) else a
     b = f4(0) if abs(b) < f4(0.004) else b
@@ -66,10 +68,11 @@ def _direction(red, green, blue):
 
 @njit
 def halve(texels, source, target, channels, weighted):
-    """Write a mip level of half the size: each texel is the mean of the part of the level before that it covers.
+    """Write a mip level of half the size: each texel is the mean of the part of the previous level that it covers.
 
-    source, target: first word, width, height. An odd side is halved as Guthe and Heckbert say (Non-Power-of-Two Mipmapping,
-    2005). With `weighted`, the first three channels count by the fourth, so that colours of clear texels do not bleed.
+    source, target: first word, width, height. An odd side is halved by the method of Guthe and Heckbert (Non-Power-of-Two
+    Mipmapping, 2005). With `weighted`, the first three channels are weighted by the fourth, so that colours of clear texels do
+    not bleed.
     """
     first, width, height = source
     start, columns, rows = target
@@ -101,7 +104,7 @@ def halve(texels, source, target, channels, weighted):
 
 @inner
 def _mean(texels, at, first, width, channels, columns, rows, sides, by_alpha):
-    """Write the means of four channels of one texel, which covers these columns and rows of the level before in part."""
+    """Write the means of four channels of one texel, which partly covers these columns and rows of the previous level."""
     left, right, top, bottom, area = sides
     r, g, b, a, weight, whole = f4(0), f4(0), f4(0), f4(0), f4(0), f4(0)
     for j in range(rows[0], rows[1]):

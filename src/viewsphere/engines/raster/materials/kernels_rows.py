@@ -12,8 +12,8 @@ from viewsphere.truth.raster.kernels_place import there, turned
 
 @njit
 def place_rows(m, own, own_normals, origin, unit, rows):
-    """Write positions (V, 3) from `origin` in `unit`s, and normals (V, 3), of a mesh in the pose m (4, 4) in rows of
-    `Surfaces.vertices`; 0 for no number.
+    """Place a mesh with the pose m (4, 4) in rows of `Surfaces.vertices`: positions (V, 3) from `origin` in `unit`s, and
+    normals (V, 3). Values that are not finite become 0.
     """
     for i in range(rows.shape[0]):
         world = there(m, own[i, 0], own[i, 1], own[i, 2])

@@ -10,7 +10,7 @@ ALWAYS, HALF, NEVER = 0.0, 0.5, 2.0
 """Alpha from which a surface casts a shadow."""
 
 CLEAR = 0.5
-"""A surface that lets more than this share of the light through casts no shadow."""
+"""Share of transmitted light above which a surface casts no shadow."""
 
 
 def material_row(
@@ -22,7 +22,7 @@ def material_row(
     catcher: bool = False,
     per_length: float = 0.0,
 ) -> list[float]:
-    """The material's row of `Surfaces.looks`. Metallic and roughness of `repaint` stand for the factor and its texture.
+    """The material's row of `Surfaces.looks`. Metallic and roughness of `repaint` replace the factor and its texture.
 
     per_length: texture coordinates per unit of length, for the ground. Reflectances at normal incidence are those of
     KHR_materials_ior and KHR_materials_specular, before the factor `specular` and the limit of 1 are applied.

@@ -1,4 +1,4 @@
-"""Pack what the triangles are made of for the shading kernels."""
+"""The materials and vertices of triangles, packed for the shading kernels."""
 
 from __future__ import annotations
 
@@ -25,15 +25,15 @@ from viewsphere.truth.raster.visibility import Visibility, homogeneous, left_out
 
 
 class Lengths(NamedTuple):
-    """The frame of the engine's lengths: their `unit` in metres, and their `origin` in world metres."""
+    """The frame of the engine's lengths: `unit` in metres, and `origin` in world metres."""
 
     origin: tuple[float, float, float]
     unit: float
 
 
 class Materials(NamedTuple):
-    """Materials of a stage, the ground's last. looks and bundles: see `Surfaces`; first: of each mesh, where its own begin;
-    made_of: equal for meshes that have the same.
+    """Materials of a stage, the ground's last. looks and bundles: see `Surfaces`; first: the index of each mesh's first
+    material; made_of: equal for meshes with equal materials.
     """
 
     looks: Float32
@@ -53,7 +53,7 @@ def pack_materials(
 ) -> Materials:
     """The materials of all meshes.
 
-    The first `targets` meshes are what the picture is about, the others scenery. `things[i].repaints` change the materials
+    The first `targets` meshes are the targets of the picture, the others are scenery. `things[i].repaints` change the materials
     of `meshes[i]`. Raises UserError for a picture of the ground that cannot be read.
     """
     looks: list[list[float]] = []
@@ -83,8 +83,8 @@ def pack_materials(
 
 @dataclass(eq=False)
 class Rows:
-    """The vertices of a stage's surfaces: those of a thing are written where it is looked at for the first time. Most things of
-    a town are never in a picture: they cast shadows, for which rows will do that are made anew.
+    """The vertices of a stage's surfaces; those of a thing are written when it is first seen. Most things of a town are never
+    in a picture: they only cast shadows, for which temporary rows are enough.
     """
 
     surfaces: Surfaces
@@ -95,7 +95,9 @@ class Rows:
 
     @classmethod
     def of(cls, geometry: Geometry, meshes: Sequence[Mesh], materials: Materials, lengths: Lengths) -> Rows:
-        """Of all triangles of a geometry and of the meshes it was built from, made of `pack_materials` of these."""
+        """The rows of all triangles of a geometry and of the meshes it was built from; `materials` is the result of
+        `pack_materials` for these.
+        """
         vertices = sparse((len(geometry.coordinates), 16), np.float32)
         material = np.empty(len(geometry.triangles), np.int32)
         for i, mesh in enumerate(meshes):
@@ -109,22 +111,23 @@ class Rows:
         return rows
 
     def write(self, things: Iterable[int]) -> None:
-        """Write what is not yet written of these things."""
+        """Write the rows of these things that are not yet written."""
         for i in things:
             if not self._written[i]:
                 self._write(i, self.surfaces.vertices[self._own(i)])
                 self._written[i] = True
 
     def write_seen(self, camera: Camera, visibility: Visibility, geometry: Geometry) -> None:
-        """Write what may be in a picture of these triangles, and which way it faces."""
+        """Write the rows, and the facing, of triangles that may be in a picture."""
         q = homogeneous(geometry, camera) if visibility.corners is None else visibility.corners
         seen = np.flatnonzero(~left_out(geometry, q)).tolist()
         self.write(seen)
         self.geometry.triangle_normals_of(seen)
 
     def move(self, geometry: Geometry, meshes: Sequence[Mesh], things: Iterable[int]) -> None:
-        """These things, and the ground, are elsewhere, or deformed: their rows are written in place. Which way they face is
-        written where they are looked at: most of what drives through a town is in no picture.
+        """Move or deform these things and the ground: their rows are overwritten in place.
+
+        Their facing is written when they are seen, because most things that drive through a town are in no picture.
         """
         self.geometry, self.meshes = geometry, meshes
         self.surfaces = self.surfaces._replace(normals=geometry.triangle_normals_of(()))
@@ -134,7 +137,7 @@ class Rows:
         self._write_ground()
 
     def part(self, i: int) -> Surfaces:
-        """Thing i alone, or the ground, which comes after the last."""
+        """The surfaces of thing i alone, or of the ground, whose index is after the last."""
         starts = (*self.geometry.triangle_start, len(self.geometry.triangles))
         own = part_of(self.surfaces, starts[i], starts[i + 1])
         if i == len(self._written) or self._written[i]:
@@ -148,7 +151,7 @@ class Rows:
         return slice(self.geometry.vertex_start[i], self.geometry.vertex_start[i + 1])
 
     def _write(self, i: int, rows: Float32) -> None:
-        """Write those of thing i."""
+        """Write the rows of thing i."""
         mesh = self.meshes[i]
         rows[:] = 0.0
         rows[:, 7:11] = 1.0
@@ -158,7 +161,7 @@ class Rows:
         self._place(i, rows)
 
     def _place(self, i: int, rows: Float32) -> None:
-        """Write where thing i is, and its normals. Without numbers for a normal a face is flat."""
+        """Write the place of thing i, and its normals. A face without valid normals is flat."""
         g, frame = self.geometry, (np.array(self.lengths.origin), self.lengths.unit)
         place_rows(g.poses[i], g.coordinates[self._own(i)], read_only(self.meshes[i].normals), *frame, rows)
 
@@ -170,5 +173,5 @@ class Rows:
 
 
 def part_of(surfaces: Surfaces, first: int, stop: int | None = None) -> Surfaces:
-    """Triangles [first, stop) alone."""
+    """The surfaces of triangles [first, stop) alone."""
     return surfaces._replace(triangles=surfaces.triangles[first:stop], material=surfaces.material[first:stop])

@@ -1,1 +1,1 @@
-"""The reflections in mirrors and the view through glass."""
+"""Reflections in mirrors, and the view through glass."""

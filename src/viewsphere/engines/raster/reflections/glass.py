@@ -14,8 +14,9 @@ from viewsphere.engines.raster.reflections.tracing import tree_of
 
 
 class Glass(NamedTuple):
-    """The tree of its triangles, as `tracing.Tree` has it; for each place in its leaves normals (L * 8, 9) float32: of three
-    corners; material (L * 8,) int32: rows of `Surfaces.looks`. Empty where nothing bends light.
+    """The solid glass of a stage. tree: the tree of its triangles, see `tracing.Tree`. For each place in its leaves: normals (L
+    * 8, 9) float32 of the three corners, and material (L * 8,) int32, a row of `Surfaces.looks`. Empty if nothing refracts
+    light.
     """
 
     bounds: Float32

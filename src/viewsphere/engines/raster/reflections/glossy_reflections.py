@@ -1,4 +1,4 @@
-"""The reflections of near things in polished level surfaces, where light bounces: floors, or the top of a table.
+"""The reflections of near things in polished level surfaces, if light bounces: floors, or the top of a table.
 
 Their material mirrors the blurred and slightly displaced view of the probes. Here the scene's own mirror image replaces it,
 sharp where a thing touches the surface. The rougher the surface, the more blurred and the weaker the image.
@@ -19,19 +19,21 @@ from viewsphere.model.sensors.camera import Camera
 from viewsphere.truth.raster.visibility import Visibility
 
 LEVEL = 0.9995
-"""z of a normal from which on a surface is a level mirror."""
+"""Minimum z of the normal of a level mirror."""
 
 THICK = 0.004
-"""Metres: what lies in one level, and what a mirror does not mirror, as it lies on it or below."""
+"""Thickness in metres of one level; things on the mirror within it, or below, are not reflected."""
 
 LEAST = 0.02
-"""Share of a picture from which on a mirror counts."""
+"""Minimum share of a picture for a mirror to count."""
 
 SHARP, MATT = 0.3, 0.5
-"""Roughness up to which the mirror image counts in full, and from which on not at all: what probes see is as blurred."""
+"""Roughness up to which the mirror image has full weight, and above which it has none: there, the probes' view is equally
+blurred.
+"""
 
 SPREAD = 0.6
-"""Reach of the blur of what is far away, in halves of the picture's height, over the square of the roughness."""
+"""Reach of the blur of distant things, in halves of the picture's height, over the square of the roughness."""
 
 
 NOWHERE = np.empty(0, np.intp)
@@ -39,8 +41,8 @@ NOWHERE = np.empty(0, np.intp)
 
 
 def mirror_in_polish(baked: Baked, camera: Camera, visibility: Visibility, radiance: Float32) -> NDArray[np.intp]:
-    """Put the mirror image of things in place of what polished surfaces mirror in `radiance` (H * W, 4), if light bounces.
-    Returns the pixels (n,) that show these surfaces.
+    """Replace the reflections of polished surfaces in `radiance` (H * W, 4) by the mirror image of things, if light bounces.
+    Return the pixels (n,) that show these surfaces.
     """
     if baked.bounces.grid[0] == 0:
         return NOWHERE
@@ -68,11 +70,11 @@ def mirror_in_polish(baked: Baked, camera: Camera, visibility: Visibility, radia
 
 
 def _mirror(baked: Baked, camera: Camera, visibility: Visibility) -> tuple[NDArray[np.intp], float]:
-    """Pixels (n,) of the level below the camera that most pixels show, and its height."""
+    """Pixels (n,) of the level surface below the camera that covers most pixels, and its height."""
     shown = visibility.triangle.reshape(-1)
     polished = (
         baked.surfaces.looks[:, L_ROUGH] + baked.surfaces.looks[:, L_ROUGH_TEXEL] < MATT
-    )  # whatever a texture leaves of it
+    )  # before any texture reduces it
     is_level = (np.abs(baked.surfaces.normals[:, 2]) > LEVEL) & (baked.kind[:-1] == kernels_paint.SOLID)
     is_level &= polished[baked.surfaces.material]
     at = np.flatnonzero((shown >= 0) & is_level[shown])

@@ -1,8 +1,8 @@
-"""Solid glass: where the light comes from that it bends towards the viewer.
+"""Solid glass: the source of the light that it refracts towards the viewer.
 
-Behind the first surface that a line of sight meets, the refracted ray is followed through all solid glass, by Snell's law at
-each surface, until it leaves the last one for good: so walls, lips and thick floors are as a path tracer has them. What a
-surface reflects of a ray that passes is not followed: the ray stands for it, too.
+Behind the first surface on a line of sight, the refracted ray is followed through all solid glass, by Snell's law at each
+surface, until it leaves the last one. So walls, lips and thick floors look as in a path tracer. The reflected part of a ray
+that passes is not followed; the ray replaces it, too.
 """
 
 from __future__ import annotations
@@ -39,9 +39,9 @@ from viewsphere.kernels.jit import inner
 f4 = nb.float32
 U = nb.uintp
 FAR = np.float32(1e9)
-MOST = 8  # surfaces that a ray meets before it is caught
-APART = np.float32(0.02)  # how far from a surface a ray goes on, in pixels
-STRAIGHT, ASTRAY = np.float32(0.995), np.float32(0.9)  # cosines between which the bent light replaces that from straight behind
+MOST = 8  # surfaces that a ray hits before it counts as trapped
+APART = np.float32(0.02)  # offset from a surface at which a ray continues, in pixels
+STRAIGHT, ASTRAY = np.float32(0.995), np.float32(0.9)  # cosines between which bent light replaces that from behind
 
 
 @inner
@@ -51,14 +51,14 @@ def _dot(a, b):
 
 @inner
 def _along(a, s, b, t):
-    """a s + b t."""
+    """The vector a s + b t."""
     return a[0] * s + b[0] * t, a[1] * s + b[1] * t, a[2] * s + b[2] * t
 
 
 @inner
 def _turned(d, n, ratio):
-    """The ray that goes on from a surface whose unit normal looks against it, and whether it passes: if not, it is reflected
-    totally. ratio: index of refraction before the surface over that behind.
+    """The ray that leaves a surface whose unit normal faces it, and whether it passes; if not, it is totally reflected. ratio:
+    index of refraction before the surface over the index behind it.
     """
     cosine = min(-_dot(d, n), f4(1))
     squared = f4(1) - ratio * ratio * (f4(1) - cosine * cosine)
@@ -69,7 +69,7 @@ def _turned(d, n, ratio):
 
 @inner
 def _normal(glass, found, o):
-    """Of a point of a triangle: the flat normal, of any length, and the smooth unit normal on the same side."""
+    """The normals at a point of a triangle: the flat normal, of any length, and the smooth unit normal on the same side."""
     corner, one, two = triangle(glass, found)
     normals, at = glass.normals[U(found)], (o[0] - corner[0], o[1] - corner[1], o[2] - corner[2])
     aa, ac, cc, qa, qc = _dot(one, one), _dot(one, two), _dot(two, two), _dot(at, one), _dot(at, two)
@@ -86,8 +86,8 @@ def _normal(glass, found, o):
 
 @inner
 def _follow(glass, looks, o, d, apart, stack):
-    """The direction in which a ray within glass leaves it at last, the colour it takes on there, and the share that is not
-    scattered: 0 where the glass is not closed. A ray that is caught within the glass sees black.
+    """The direction in which a ray within glass finally leaves it, the colour it takes on inside, and the share that is not
+    scattered: 0 if the glass is not closed. A ray trapped in the glass is black.
     """
     red, green, blue, clear, is_within = f4(1), f4(1), f4(1), f4(1), True
     for _ in range(MOST):
@@ -101,7 +101,7 @@ def _follow(glass, looks, o, d, apart, stack):
         leaves = _dot(flat, d) > f4(0)
         if leaves:
             n = -n[0], -n[1], -n[2]
-        if _dot(n, d) > f4(-1e-3):  # the smooth normal looks away: the ray grazes the surface
+        if _dot(n, d) > f4(-1e-3):  # the smooth normal faces away: the ray grazes the surface
             n = _along(n, f4(1), d, -_dot(n, d) - f4(1e-3))
             per = f4(1) / f4(math.sqrt(_dot(n, n)))
             n = n[0] * per, n[1] * per, n[2] * per
@@ -116,7 +116,7 @@ def _follow(glass, looks, o, d, apart, stack):
 
 @inner(_nrt=True)
 def bend(count, glass, looks, b, which):
-    """Bend the light of gathered samples that show the outside of solid glass.
+    """Refract the light of gathered samples that show the outside of solid glass.
 
     BENT_X to BENT_Z are the direction of the bent light, STAIN_R to STAIN_B its colour after further surfaces. BENT is its
     share, 0 to 1, instead of the light from straight behind; it is 0 for other samples.

@@ -1,4 +1,4 @@
-"""The points at which mirrors are seen, the blur of their images, and the overlay of these images on the mirrors."""
+"""The points where rays meet mirrors, the blur of mirror images, and the overlay of these images on the mirrors."""
 
 from __future__ import annotations
 
@@ -12,17 +12,19 @@ from viewsphere.kernels.lanes import FAST
 
 f4 = nb.float32
 U = nb.uintp
-COLUMNS = 4  # of what is blurred: light, and how much of it is known
+COLUMNS = 4  # columns that are blurred: light, and the known share of it
 
 
-ALIKE = 0.98  # cosine between the normals of pixels that share what their lobes see
-SHARED, REACH = 0.1, 2  # roughness from which on pixels share it, and how many pixels away
+ALIKE = 0.98  # cosine between the normals of pixels that share the hits of their lobes
+SHARED, REACH = 0.1, 2  # roughness above which pixels share them, and the distance in pixels
 
 
 @njit(fastmath=FAST, _nrt=True)
 def shared(at, normals, made_of, gloss, shown, is_known, width):
-    """The mean (n, 3) of what the lobes of pixels `at` (n,) around each of them see, shown (n, 3): of those of one material,
-    made_of (n,), that face alike. gloss (n, 13): see `kernels_split.gloss`; `width`: pixels in a row; at: ever greater.
+    """The mean (n, 3) of the values `shown` (n, 3), seen in the lobes of pixels `at` (n,), over nearby pixels with the same
+    material (`made_of`, (n,)) and facing.
+
+    gloss (n, 13): see `kernels_split.gloss`; `width`: pixels in a row; at: in ascending order.
     """
     first, last = at[0], at[-1]
     rows, means = np.full(last - first + 1, -1, np.int32), np.empty_like(shown)
@@ -48,10 +50,11 @@ def shared(at, normals, made_of, gloss, shown, is_known, width):
 
 @njit
 def meet(at, width, rays, camera_from_pixel, rotation, center, inverse_depth, cosine, place):
-    """Fill cosine (n,), of the rays of pixels `at` (n,) to the vertical, and place (n, 3), which they meet in the world.
+    """Fill cosine (n,) of the angle between the rays of pixels `at` (n,) and the vertical, and place (n, 3), where they end in
+    the world.
 
-    rays (H * W, 3): of a distorted lens, in the camera's axes; empty for a pinhole, whose are those of `camera_from_pixel`.
-    rotation, center: camera from world axes, and where the camera is.
+    rays (H * W, 3): those of a distorted lens, in the camera's axes; empty for a pinhole, whose rays follow from
+    `camera_from_pixel`. rotation, center: camera from world axes, and the camera's position.
     """
     a, b, c = U(0), U(1), U(2)
     for i in range(U(at.shape[0])):
@@ -79,7 +82,7 @@ def spread_out(own, image, rows):
 
 @njit
 def gather_means(own, rows, means):
-    """The opposite, after sums over neighbours: means (n, 3)."""
+    """The inverse of `spread_out`, after sums over neighbours: means (n, 3)."""
     for i in range(U(own.shape[0])):
         p = U(own[i])
         count = max(rows[p, U(3)], f4(1e-6))
@@ -125,11 +128,11 @@ def box_across(values, reach, out):
 
 @njit
 def polish(at, gloss, near, soft, nearness, inverse_depth, sharp, matt, radiance):
-    """Put what is mirrored in place of what pixels `at` (n,) of radiance (H * W, 4) were taken to mirror.
+    """Replace the light that pixels `at` (n,) of radiance (H * W, 4) were assumed to mirror by the mirror image.
 
-    gloss (n, 13): see `kernels_split.gloss`; near, soft (n, 3): the mirror image of what is near and of what is far from the
-    mirror; nearness (n,): one over the depth of its things; sharp, matt: roughness up to which it counts in full, and from
-    which on not at all.
+    gloss (n, 13): see `kernels_split.gloss`; near, soft (n, 3): the mirror image of things near to and far from the mirror;
+    nearness (n,): one over the depth of its things; sharp, matt: roughness up to which the image has full weight, and above
+    which it has none.
     """
     for i in range(U(at.shape[0])):
         p = U(at[i])

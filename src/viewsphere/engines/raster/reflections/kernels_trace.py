@@ -1,9 +1,9 @@
-"""The first hits of rays, from a tree of boxes around triangles, for light that is baked once and needs no other package.
+"""The first hits of rays, found in a tree of boxes around triangles, for light that is baked once. It needs no other package.
 
-The tree is a bounding volume hierarchy by the surface area heuristic in bins (Wald 2007). Eight boxes are tested at once
-(Wald, Benthin and Boulos 2008).
+The tree is a bounding volume hierarchy by the surface area heuristic in bins (Wald 2007). Eight boxes are tested at once (Wald,
+Benthin and Boulos 2008).
 
-Both sides of a triangle are met. All is computed in one order: the same triangles and rays give the same bits.
+Rays hit both sides of a triangle. The order of computation is fixed: the same triangles and rays give the same bits.
 """
 
 from __future__ import annotations
@@ -20,8 +20,8 @@ from viewsphere.kernels.lanes import Strict, cross, dot, least, load, most, spre
 f4 = nb.float32
 U = nb.uintp
 BINS = 16
-WIDE = 8  # children of a node, triangles of a leaf, at most: one vector
-STEEP = 32  # down to here, parts are cut where that costs least
+WIDE = 8  # maximum children of a node and triangles of a leaf: one vector
+STEEP = 32  # down to this level, parts are cut at the lowest cost
 DEEP = 2 * STEEP * WIDE
 ROUNDED = 1.0000005  # farther than the end of a box may be by rounding: a box that is missed so would let rays through a wall
 NOTHING = -1
@@ -29,7 +29,7 @@ NOTHING = -1
 
 @inner
 def _area(box):
-    """Half the surface of a box of six numbers, lowest and highest x, y, z."""
+    """Half the surface area of a box of six numbers, lowest and highest x, y, z."""
     x, y, z = box[3] - box[0], box[4] - box[1], box[5] - box[2]
     return x * y + y * z + z * x if x >= f4(0) else f4(0)
 
@@ -48,7 +48,7 @@ def _widen(box, other):
 
 @inner
 def _bound(boxes, order, first, stop, box, middles):
-    """The box of some triangles, and that of twice their boxes' middles."""
+    """The box of some triangles, and the box of the doubled middles of their boxes."""
     _clear(box)
     _clear(middles)
     for i in range(first, stop):
@@ -66,7 +66,7 @@ def _bin(own, axis, low, scale):
 
 @inner
 def _best_cut(boxes, order, first, stop, middles, counts, bins, right):
-    """The axis along which the middles lie farthest apart, and the bin before which a cut costs least; -1 for none."""
+    """The axis along which the middles are farthest apart, and the bin before which a cut has the lowest cost; -1 for none."""
     axis = 0
     for k in range(1, 3):
         if middles[k + 3] - middles[k] > middles[axis + 3] - middles[axis]:
@@ -102,7 +102,7 @@ def _best_cut(boxes, order, first, stop, middles, counts, bins, right):
 
 @inner
 def _halves(boxes, order, first, stop, level, middles, counts, bins, right):
-    """Sort the triangles from `first` to `stop` into two parts, cut where that costs least; returns where the second begins.
+    """Sort the triangles from `first` to `stop` into two parts, cut at the lowest cost; return the start of the second part.
 
     Deep down, parts are halves, so that no tree is deeper than 2 * STEEP.
     """
@@ -123,10 +123,10 @@ def _halves(boxes, order, first, stop, level, middles, counts, bins, right):
 
 @njit(_nrt=True)
 def build(boxes, order, bounds, links):
-    """Fill bounds (2 T, 6) float32 and links (2 T, 2) int32 for T boxes (T, 6) of triangles; returns how many nodes there are.
+    """Fill bounds (2 T, 6) float32 and links (2 T, 2) int32 for T boxes (T, 6) of triangles; return the number of nodes.
 
-    order (T,) int32, first 0 to T - 1, is sorted by leaves. Of a leaf, links hold its first place in `order` and its count; of
-    another node, that of the first of its two children, which lie side by side, and 0.
+    order (T,) int32, initially 0 to T - 1, is sorted by leaves. For a leaf, links holds its first place in `order` and its
+    count. For another node, it holds the first of its two adjacent children, and 0.
     """
     waiting, depth, nodes = np.empty((2 * STEEP + 1, 4), np.int64), 1, 1
     counts, bins, right = np.empty(BINS, np.int32), np.empty((BINS + 1, 6), np.float32), np.empty(BINS, np.float32)
@@ -151,8 +151,8 @@ def build(boxes, order, bounds, links):
 
 @inner
 def _gather(bounds, links, node, group):
-    """Fill group (WIDE,) with the nodes that stand for `node`: the widest of them gives way to its children as long as there is
-    room. Returns how many there are.
+    """Fill group (WIDE,) with the nodes that replace `node`: the largest of them is replaced by its children while there is
+    room. Return their number.
     """
     group[0], count = node, 1
     while count < WIDE:
@@ -170,7 +170,7 @@ def _gather(bounds, links, node, group):
 
 @njit(_nrt=True)
 def widen(bounds, links, order, corners, tree):
-    """Fill a `tracing.Tree` with what `build` has found; corners (T, 9): of all triangles. Returns how many nodes there are."""
+    """Fill a `tracing.Tree` with the result of `build`; corners (T, 9): those of all triangles. Return the number of nodes."""
     waiting, depth, nodes, leaves = np.empty((DEEP, 2), np.int64), 1, 1, 0
     group = np.empty(WIDE, np.int64)
     waiting[0, 0], waiting[0, 1] = 0, 0
@@ -202,20 +202,21 @@ def widen(bounds, links, order, corners, tree):
 
 
 def _mask(flags):
-    """Flags of lanes as the bits of an unsigned number."""
+    """Flags of lanes packed as the bits of an unsigned number."""
     builder = flags.builder
     return builder.zext(builder.bitcast(flags.value, ir.IntType(WIDE)), ir.IntType(64))
 
 
 def _rows(context, builder, signature, arguments, count):
-    """Of the first argument, an array, the item that the second one counts: so many rows of WIDE numbers."""
+    """The item of the first argument, an array, at the index of the second one: `count` rows of WIDE numbers."""
     data = context.make_array(signature.args[0])(context, builder, arguments[0]).data
     first = builder.mul(arguments[1], arguments[1].type(count * WIDE))
     return [_strict(load(builder, data, builder.add(first, first.type(row * WIDE)), WIDE)) for row in range(count)]
 
 
 def _strict(lanes):
-    """Rays that pass between two triangles of a closed surface by some rounding would bring light from behind it."""
+    """Exact comparison of lanes: a ray that passed between two triangles of a closed surface would leak light from behind it.
+    """
     return Strict(lanes.builder, lanes.value)
 
 
@@ -260,7 +261,7 @@ def _meets(typing, corners, leaf, o, d, limit, stack):
         scale = 1 / dot(a, p)
         s = [start[k] - corner[k] for k in range(3)]
         q = cross(s, a)
-        # Numbers without bounds, where the ray lies in the triangle's plane, pass no comparison.
+        # Infinite numbers, from rays in the triangle's plane, pass no comparison.
         u, v, t = dot(s, p) * scale, dot(way, q) * scale, dot(b, q) * scale
         store(context.make_array(signature.args[5])(context, builder, arguments[5]).data, arguments[1].type(0), t)
         return _mask((u >= 0) & (v >= 0) & (u + v <= 1) & (t > 0) & (t < spread(builder, arguments[4], WIDE)))
@@ -280,15 +281,15 @@ def _first(typing, bits):
 
 @inner
 def _over(d):
-    """1 / d, infinity where that would be none."""
+    """1 / d, infinity if d is 0."""
     return f4(1) / d if abs(d) > f4(1.2e-38) else f4(np.inf)
 
 
 @inner
 def nearest(tree, o, d, limit, is_any, stack):
-    """The place in the tree's leaves of the first triangle that a ray meets before `limit`, -1 for none, and how far along it.
+    """The place in the tree's leaves of the first triangle that a ray hits before `limit`, -1 for none, and its distance.
 
-    o, d: tuples; stack (DEEP, 2) float32: scratch; is_any: any triangle will do.
+    o, d: tuples; stack (DEEP, 2) float32: scratch; is_any: return any hit, not only the first.
     """
     shortest, found = limit, NOTHING
     inverse = _over(d[0]), _over(d[1]), _over(d[2])
@@ -335,11 +336,11 @@ def triangle(tree, place):
 
 @njit(_nrt=True)
 def cast(tree, origins, directions, turn, limit, met, far):
-    """For each k of K and each origin (N, 3): what is met first in direction `directions[turn, k]` (W, K, 3), as a place in the
-    tree, into met (K, N) int32, -1 for nothing before `limit`; and how far away, in lengths of the direction, into far (K, N)
+    """Find the first hit from each origin (N, 3) in each direction `directions[turn, k]` (W, K, 3), k of K. // Its place in the
+    tree goes into met (K, N) int32, -1 for nothing before `limit`; its distance, in lengths of the direction, into far (K, N)
     float32. turn (N,): each origin's own.
 
-    Parallel rays one after another find the same boxes in the cache: origins of one turn are best next to one another.
+    Consecutive parallel rays find the same boxes in the cache, so origins with the same turn should be adjacent.
     """
     stack = np.empty((DEEP, 2), np.float32)
     for k in range(U(directions.shape[1])):
@@ -353,7 +354,7 @@ def cast(tree, origins, directions, turn, limit, met, far):
 
 @njit(_nrt=True)
 def unblocked(tree, origins, ways, clear):
-    """Return whether nothing lies between each origin (N, 3) and origin + way (N, 3): 1 or 0, into clear (N,) float32."""
+    """Write into clear (N,) float32 whether nothing is between each origin (N, 3) and origin + way (N, 3): 1 or 0."""
     stack = np.empty((DEEP, 2), np.float32)
     for i in range(U(origins.shape[0])):
         o = origins[i, U(0)], origins[i, U(1)], origins[i, U(2)]

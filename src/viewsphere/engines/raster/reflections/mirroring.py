@@ -1,4 +1,4 @@
-"""The mirror images in level surfaces: the scene once more, as the eye's mirror image below the surface sees it."""
+"""Mirror images in level surfaces: the scene rendered again from the camera's mirror image below the surface."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from viewsphere.truth.raster.visibility import Visibility, lens_rays, rasterize
 Float = NDArray[np.float64]
 
 BRIGHTEST = 4.0
-"""Radiance of what is mirrored, at most: highlights on it would dot what mirrors it."""
+"""Maximum radiance of mirrored things: brighter highlights would show as dots in the mirror."""
 
 
 class Mirrored(NamedTuple):
@@ -38,15 +38,16 @@ class Mirrored(NamedTuple):
 
 
 def lying(geometry: Geometry, height: float) -> NDArray[np.bool_]:
-    """Return a mask of the triangles (T,) that lie wholly below a height."""
+    """Return a mask of the triangles (T,) that are wholly below a height."""
     return geometry.triangle_tops < height
 
 
 def looked_at(camera: Camera, visibility: Visibility, at: NDArray[np.intp]) -> tuple[Float, Float]:
-    """Cosines (n,) of these pixels' rays to the vertical, and the places (n, 3) of the world that they meet."""
+    """Cosines (n,) of the angles between these pixels' rays and the vertical, and the world places (n, 3) where the rays end.
+    """
     rays, camera_from_pixel = lens_rays(camera), inverse_camera_matrix(camera.intrinsics)
     table = np.zeros((0, 3)) if rays is None else rays.reshape(-1, 3)
-    table.setflags(write=False)  # as those of a lens are: the kernel is compiled once
+    table.setflags(write=False)  # same type as for a lens, for one compilation
     cosine, place = np.empty(len(at)), np.empty((len(at), 3))
     pose, depth = (camera.R, camera.center), visibility.inverse_depth.reshape(-1)
     kernels.meet(at, camera.width, table, camera_from_pixel, *pose, depth, cosine, place)
@@ -67,31 +68,32 @@ def mirrored(baked: Baked, camera: Camera, plane: float, left_out: NDArray[np.bo
     seen = Visibility(triangle.reshape(shape), depth.reshape(shape))
     shade_all(own, below, view, seen, triangle, depth, light, NO_SPLIT)
     sky = np.ones_like(light)
-    sky[at] = 0  # looked up here alone
+    sky[at] = 0  # read only here
     sky_behind(view, baked.surrounding, sky)
     return Mirrored(np.minimum(light[at, :3], BRIGHTEST), light[at, 3:], sky[at, :3], depth[at])
 
 
 def _without(geometry: Geometry, left_out: NDArray[np.bool_]) -> Geometry:
-    """The same, but these triangles (T,) are never seen, and all others from both sides: a mirror is no camera."""
+    """The geometry without these triangles (T,), and with all others visible from both sides, because a mirror is not a camera.
+    """
     return replace(with_both_sides(geometry), triangle_cutout=np.where(left_out, np.int32(NEVER), geometry.triangle_cutout))
 
 
 def _below(camera: Camera, plane: float) -> Camera:
-    """The mirror image of a camera in a level plane: it sees things where their mirror images are."""
+    """The mirror image of a camera in a level plane: it sees things at the places of their mirror images."""
     turned = camera.R * np.array([1.0, 1.0, -1.0])
     center = camera.center * np.array([1.0, 1.0, -1.0]) + np.array([0.0, 0.0, 2 * plane])
     return Camera(camera.intrinsics, turned, -turned @ center)
 
 
 def blurred(image: Float32, at: NDArray[np.intp], camera: Camera, reach: tuple[int, int]) -> Float32:
-    """The mean (n, 3) of mirror images (n, 3) around each pixel of `at` (n,), so many pixels down and across."""
+    """The mean (n, 3) of mirror images (n, 3) around each pixel of `at` (n,), over `reach` pixels down and across."""
     first, last = int(at.min()) // camera.width, int(at.max()) // camera.width
     rows = np.zeros((last - first + 1, camera.width, kernels.COLUMNS), np.float32)
     own = at - first * camera.width
     kernels.spread_out(own, image, rows.reshape(-1, kernels.COLUMNS))
     other = np.empty_like(rows)
-    for _ in range(2):  # two boxes are nearly a bell
+    for _ in range(2):  # two boxes are nearly a Gaussian
         kernels.box_down(rows.reshape(len(rows), -1), reach[0], other.reshape(len(rows), -1))
         kernels.box_across(other, reach[1], rows)
     means = np.empty((len(at), 3), np.float32)

@@ -1,10 +1,10 @@
-"""The reflections of still things in smooth surfaces, where light bounces: window panes, mirrors, polished metal.
+"""Reflections of still things in smooth surfaces, if light bounces: window panes, mirrors, polished metal.
 
-Their material mirrors the probes' view, as blurred as roughness 0.5 shows it. A ray from each pixel finds the reflected thing
-instead: sharp, lit by sun, lamps and bounced light. Where light bounces finely, rays in the lobes of rougher surfaces do so,
-too. Targets before scenery, and moving things, neither mirror in this way nor are mirrored. Cut-out textures are solid. Where
-a ray meets the ground, the probes' light stays. The level surface that shows most has a mirror image of its own, of all
-things (`glossy_reflections`).
+Their material mirrors the probes' view, as blurred as at roughness 0.5. A ray from each pixel finds the reflected thing
+instead: sharp, lit by sun, lamps and bounced light. With fine bounces, rays in the lobes of rougher surfaces do this, too.
+Targets in front of scenery, and moving things, neither mirror in this way nor are mirrored. Cut-out textures count as solid. If
+a ray meets the ground, the probes' light is kept. The largest visible level surface has its own mirror image of all things
+(`glossy_reflections`).
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from viewsphere.truth.raster.visibility import Visibility
 
 Float = NDArray[np.float64]
 SMOOTHEST = 1e-3
-"""Squared roughness, at least."""
+"""Minimum squared roughness."""
 
 GOLDEN = 0.6180339887
 PLASTIC = 0.7548776662, 0.5698402910
@@ -38,30 +38,30 @@ PLASTIC = 0.7548776662, 0.5698402910
 
 
 SHARP, BLURRED = 0.1, 0.2
-"""Roughness up to which what a ray sees counts in full, and from which on not at all."""
+"""Roughness up to which the result of a ray has full weight, and above which it has none."""
 
 FINE_SHARP, FINE_BLURRED, LOBE_RAYS = 0.45, 0.55, 16
-"""The same where light bounces finely, with so many rays in each pixel's lobe: what probes see is as blurred as roughness 0.5
-shows it.
+"""The same limits for fine bounces, and the number of rays in each pixel's lobe: the probes' view is as blurred as at roughness
+0.5.
 """
 
 OFF = 0.002
-"""Metres along a ray at which it begins, and off the surface that it meets those towards lights."""
+"""Distance in metres along a ray at which it begins, and offset from its hit at which rays towards lights begin."""
 
 LAYERS = 3
-"""Surfaces that a ray goes through, at most, where they are blended with what is behind them; the last is solid."""
+"""Maximum number of surfaces on a ray, if they are blended with their background; the last one is solid."""
 
 SKY_ROUGHNESS = np.float32(0.03)
-"""Of the map of the sky that is read: nearly sharp."""
+"""Roughness of the sky map that is read: nearly sharp."""
 
 SOME = 1 << 16
-"""Pixels at a time: each takes some 300 bytes."""
+"""Number of pixels processed at a time: each takes about 300 bytes."""
 
 
 def mirror_in_panes(
     baked: Baked, camera: Camera, visibility: Visibility, left_out: NDArray[np.intp], radiance: Float32
 ) -> None:
-    """Put what rays see in place of what smooth surfaces are taken to mirror in `radiance` (H * W, 4), if light bounces, but in
+    """Replace the reflections of smooth surfaces in `radiance` (H * W, 4) by the results of rays, if light bounces, except in
     the pixels `left_out` (n,).
     """
     if baked.bounce_scene is None or baked.tree is None:
@@ -106,10 +106,10 @@ def _seen_in_lobes(
     at: Int32,
     width: Float32,
 ) -> tuple[Float32, NDArray[np.bool_]]:
-    """The mean radiance (n, 3) of what `LOBE_RAYS` of each of the pixels `at` (n,) see, and where there is any, (n,). Rays that
-    see what is not known have the light that the pixel was taken to mirror.
+    """The mean radiance (n, 3) along `LOBE_RAYS` rays from each of the pixels `at` (n,), and whether there is any, (n,). Rays
+    with an unknown result have the light that the pixel was assumed to mirror.
 
-    facing: see `_facing`; gloss (n, 13): see `kernels_split.gloss`; width (n,): of a pixel there.
+    facing: see `_facing`; gloss (n, 13): see `kernels_split.gloss`; width (n,): the width of a pixel there.
     """
     shown, known = np.zeros((len(at), 3), np.float32), np.zeros(len(at), np.bool_)
     toward, normals = facing
@@ -141,8 +141,8 @@ def _panes(baked: Baked, bounce_scene: BounceScene, visibility: Visibility, left
 def _seen(
     baked: Baked, bounce_scene: BounceScene, tree: Tree, sights: tuple[Float32, Float32, Float32], pixel: float
 ) -> tuple[Float32, NDArray[np.bool_]]:
-    """Radiance (n, 3) of what is seen along rays, and where it is known (n,). sights: where rays begin (n, 3), their
-    directions of length 1 (n, 3), and the width of a pixel there (n,), which grows by `pixel` a length.
+    """Radiance (n, 3) along rays, and whether it is known (n,). sights: origins of rays (n, 3), their directions of length 1
+    (n, 3), and the width of a pixel there (n,), which grows by `pixel` per length.
     """
     origins, ways, width = sights
     off, ground = np.float32(OFF / bounce_scene.unit), bounce_scene.ground_z is not None
@@ -174,8 +174,8 @@ def _seen(
 def _shaded(
     baked: Baked, bounce_scene: BounceScene, tree: Tree, off: np.float32, hits: tuple[Int32, Float32, Float32, Float32]
 ) -> tuple[Float32, Float32]:
-    """Radiance (n, 3) of what rays hit, as if it scattered all light, and its opacity (n,). hits: triangles (n,), places and
-    the rays' directions (n, 3), and a pixel's width (n,).
+    """Radiance (n, 3) of the hits of rays, computed as if they scattered all light, and its opacity (n,). hits: triangles (n,),
+    places and the rays' directions (n, 3), and a pixel's width (n,).
     """
     triangle, places, ways, _ = hits
     answers, arrived, glow = (np.empty((len(places), columns), np.float32) for columns in (7, 3, 3))
@@ -195,12 +195,12 @@ def _shaded(
 def lobe_rays(
     toward: Float32, normals: Float32, roughness: Float32, pixels: Int32, columns: int, count: int
 ) -> tuple[Float32, Float32]:
-    """Directions (count, N, 3) from which light reaches the viewer, who is `toward` (N, 3), by way of rough surfaces, and how
-    much each of them counts, (count, N), 0 for those into the surface.
+    """Directions (count, N, 3) from which rough surfaces reflect light towards the viewer, in the direction `toward` (N, 3),
+    and their weights, (count, N), 0 for directions into the surface.
 
     GGX's visible normals (Dupuy and Benyoub, Sampling Visible GGX Normals with Spherical Caps, 2023), each weighted by its
-    share that is not in shadow. normals (N, 3); roughness (N,); pixels (N,), of which there are `columns` in a row: neighbours
-    have different directions.
+    unshadowed share. normals (N, 3); roughness (N,); pixels (N,), with `columns` in a row: neighbours have different
+    directions.
     """
     row, column = np.divmod(pixels, columns)
     steps = np.arange(count)[:, None]
@@ -218,7 +218,9 @@ def lobe_rays(
 
 
 def _visible(view: Float, alpha: Float, first: Float, second: Float) -> Float:
-    """Visible normals (K, N, 3), the surface's along z, for numbers (K, N) in 0..1; view (N, 3), alpha (N,)."""
+    """Visible normals (K, N, 3), in axes with the surface's normal along z, for numbers (K, N) in 0..1; view (N, 3), alpha
+    (N,).
+    """
     stretch = np.stack([alpha, alpha, np.ones_like(alpha)], axis=1)
     view = view * stretch
     view /= np.sqrt((view * view).sum(axis=1, keepdims=True))

@@ -1,4 +1,4 @@
-"""Rays through triangles, for what is baked once: see `kernels_trace`."""
+"""Rays through triangles, for data that is baked once: see `kernels_trace`."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from viewsphere.engines.raster.reflections import kernels_trace as kernels
 
 
 class Tree(NamedTuple):
-    """Boxes around triangles: eight to a node, eight triangles to a leaf, as the processor's vectors take them.
+    """Boxes around triangles: eight to a node, eight triangles to a leaf, to fit vector registers.
 
-    bounds (N, 6 * 8) float32: of a node's children the lowest x of all, then y, z and the highest, infinite where there are
-    fewer; links (N, 8) int32: each child's node, or -1 - k where it is leaf k; corners (L, 9 * 8) float32: of a leaf's
-    triangles the first corner's x, y, z and both edges; order (L * 8,) int32: which triangles, some places twice.
+    bounds (N, 6 * 8) float32: the lowest x of all of a node's children, then y, z and the highest, infinite for missing
+    children; links (N, 8) int32: each child's node, or -1 - k for leaf k; corners (L, 9 * 8) float32: the first corner's x, y,
+    z and both edges of a leaf's triangles; order (L * 8,) int32: the number of the triangle in each place, some of them twice.
     """
 
     bounds: Float32
@@ -26,7 +26,7 @@ class Tree(NamedTuple):
 
 
 def tree_of(corners: Float32) -> Tree:
-    """The tree of triangles (T, 3, 3), at least one; those that have a corner without numbers are met by no ray."""
+    """The tree of triangles (T, 3, 3), at least one; no ray hits a triangle with a corner that is not finite."""
     corners = np.where(np.isfinite(corners).all(axis=(1, 2), keepdims=True), corners, np.float32(0)).astype(np.float32)
     boxes = np.concatenate([corners.min(axis=1), corners.max(axis=1)], axis=1)
     order = np.arange(len(corners), dtype=np.int32)
@@ -59,7 +59,7 @@ def cast(tree: Tree, origins: Float32, directions: Float32, turn: Int32, limit: 
 
 
 def unblocked(tree: Tree, origins: Float32, ways: Float32) -> NDArray[np.float32]:
-    """1 where nothing lies between an origin (N, 3) and origin + way (N, 3), else 0."""
+    """1 if nothing is between an origin (N, 3) and origin + way (N, 3), otherwise 0."""
     clear = np.empty(len(origins), np.float32)
     kernels.unblocked(tree, origins, ways, clear)
     return clear

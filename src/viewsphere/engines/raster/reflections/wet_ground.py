@@ -1,6 +1,6 @@
-"""The reflections in wet ground: sharp in puddles, stretched along the picture's columns in the film on rough ground.
+"""Reflections in wet ground: sharp in puddles, stretched along the picture's columns in the film on rough ground.
 
-The material of a film reflects the sky or, where light bounces, the probes' view, too. Here the scene's own mirror image
+The material of a film already reflects the sky or, if light bounces, the probes' view. Here the scene's own mirror image
 replaces this reflection.
 """
 
@@ -21,17 +21,17 @@ from viewsphere.truth.raster.visibility import Visibility
 
 Float = NDArray[np.float64]
 OCTAVES = ((0.35, 0.6), (0.9, 0.3), (2.6, 0.1))
-"""Waves a metre, and how much each counts."""
+"""Waves per metre, and the weight of each octave."""
 
 SHORE = 0.035
 """Share of the noise's range over which a puddle's border fades."""
 
 
 LOW = 0.3
-"""Metres above the ground up to which a surface mirrors, and is not mirrored: kerbs and pavements lie in between."""
+"""Height in metres above the ground up to which a surface mirrors, and is not mirrored: kerbs and pavements are below it."""
 
 LEVEL = 0.97
-"""z of a normal from which on a surface mirrors."""
+"""Minimum z of the normal of a surface that mirrors."""
 
 WATER = 0.02
 """Reflectance of water at normal incidence."""
@@ -43,13 +43,13 @@ DRAWN_OUT = 30, 150
 """The picture's height over the reach of a film's blur, down and across."""
 
 UNDER_WATER = 0.35
-"""Share of a puddle's ground that is not seen for what swims in it."""
+"""Share of a puddle's ground that murky water hides."""
 
 
 def mirror_in_water(baked: Baked, camera: Camera, visibility: Visibility, wet: Wet, radiance: Float32) -> None:
-    """Add to `radiance` (H * W, 4) of a picture, in place, what its wet ground mirrors."""
+    """Add the reflections of wet ground to `radiance` (H * W, 4) of a picture, in place."""
     geometry, shown = baked.geometry, visibility.triangle.reshape(-1)
-    plane = 0.0 if geometry.has_scenery or geometry.ground_z is None else geometry.ground_z  # in a place things stand on 0
+    plane = 0.0 if geometry.has_scenery or geometry.ground_z is None else geometry.ground_z  # places have their ground at 0
     if camera.center[2] <= plane + LOW:
         return
     low = lying(geometry, plane + LOW)
@@ -73,8 +73,8 @@ def mirror_in_water(baked: Baked, camera: Camera, visibility: Visibility, wet: W
 def _taken(
     baked: Baked, camera: Camera, visibility: Visibility, at: NDArray[np.intp], share: Float32, sky: Float32
 ) -> tuple[Float32, Float32]:
-    """The share of light that the films of pixels (n,) mirror, (n,), and the light that they were taken to mirror, (n, 3): on
-    the ground that share of the `sky`.
+    """The share of light that the films of pixels (n,) mirror, (n,), and the light that they were assumed to mirror, (n, 3):
+    for the ground, that share of the `sky`.
     """
     triangle, depth = visibility.triangle.reshape(-1), visibility.inverse_depth.reshape(-1)
     is_thing = baked.kind[triangle[at]] != kernels_paint.FLOOR
@@ -96,14 +96,14 @@ def puddles(wet: Wet, x: Float, y: Float) -> NDArray[np.float32]:
 
 
 def _least(share: float) -> float:
-    """The level that a share of the floor is above: the noise is nearly normal, of mean 1/2 and deviation 0.132."""
+    """The level that a share of the floor exceeds: the noise is nearly normal, with mean 1/2 and deviation 0.132."""
     from statistics import NormalDist
 
     return NormalDist(0.5, 0.132).inv_cdf(min(max(1 - share, 1e-6), 1 - 1e-6))
 
 
 def _noise(seed: int, x: Float, y: Float) -> Float:
-    """Smooth numbers of 0 to 1: random ones at whole places, and cubic steps between them."""
+    """Smooth numbers from 0 to 1: random values at integer places, with cubic interpolation between them."""
     column, row = np.floor(x), np.floor(y)
     across, down = ((v - i) ** 2 * (3 - 2 * (v - i)) for v, i in ((x, column), (y, row)))
     i, j = column.astype(np.int64), row.astype(np.int64)
@@ -113,7 +113,7 @@ def _noise(seed: int, x: Float, y: Float) -> Float:
 
 
 def _random(seed: int, i: NDArray[np.int64], j: NDArray[np.int64]) -> Float:
-    """A number of [0, 1) for a place: SplitMix64's last steps over a sum of its coordinates."""
+    """A number in [0, 1) for a place: SplitMix64's last steps applied to a sum of its coordinates."""
     step = np.uint64(0x9E3779B97F4A7C15)
     state = _mixed(i.astype(np.uint64) * step + np.uint64(seed))
     return (_mixed(state + j.astype(np.uint64) * step) >> np.uint64(11)).astype(np.float64) / 2**53

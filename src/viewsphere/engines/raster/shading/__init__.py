@@ -1,1 +1,1 @@
-"""From samples to light: the kernels that paint."""
+"""The shading kernels, which turn samples into light."""

@@ -1,4 +1,4 @@
-"""Weighted sums of a table's rows, all columns at once: the compiler is told which numbers make a vector."""
+"""Weighted sums of a table's rows, all columns at once, written so that the compiler puts the numbers in vectors."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from viewsphere.kernels.lanes import load, scatter, spread
 
 
 def blend(columns: int) -> Any:
-    """A function for kernels: `(table, rows, weights, b, at)`, tables of so many columns.
+    """A function for kernels, `(table, rows, weights, b, at)`, for tables with this many columns.
 
-    table: float32, any shape; rows and weights: tuples of as many uintp and float32. The sum of weight * row goes to b[at],
-    b[at + BLOCK] and so on, a column each.
+    table: float32, any shape; rows and weights: tuples of equal length, of uintp and float32. The sum of weight * row goes to
+    b[at], b[at + BLOCK] and so on, one column each.
     """
 
     @intrinsic

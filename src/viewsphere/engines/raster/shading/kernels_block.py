@@ -1,4 +1,4 @@
-"""Rows of a block of samples: one flat float32 array, so that the compiler knows that rows do not overlap.
+"""Rows of a block of samples: one flat float32 array, so that the compiler can assume that rows do not overlap.
 
 Lengths are in the stage's unit. All normals are unit vectors on the viewer's side.
 """
@@ -7,9 +7,9 @@ from __future__ import annotations
 
 BLOCK = 128
 
-# Where the sample is: position, unit direction to the viewer, geometric normal, a pixel's size at that distance.
+# The sample's place: position, unit direction to the viewer, geometric normal, a pixel's size at that distance.
 PX, PY, PZ, VX, VY, VZ, GX, GY, GZ, PIXEL = range(0, 10 * BLOCK, BLOCK)
-# What the sample is made of: shading normal, clear coat's normal, base colour (linear) and alpha.
+# The sample's material: shading normal, clear coat's normal, base colour (linear) and alpha.
 NX, NY, NZ, CX, CY, CZ, RED, GREEN, BLUE, ALPHA = range(10 * BLOCK, 20 * BLOCK, BLOCK)
 # Perceptual roughness, metallic, reflectance at normal incidence of its dielectric part, clear coat, transmission, emission,
 # flags (0 or 1), share of light that its occlusion texture leaves.
@@ -20,7 +20,7 @@ U0, V0, U1, V1, BARY1, BARY2 = range(36 * BLOCK, 42 * BLOCK, BLOCK)
 # Light around: visible share of the ambient light from above, and of the ground's light; then scratch.
 OPEN, BOUNCE, OPENX, OPENY, OPENZ = range(42 * BLOCK, 47 * BLOCK, BLOCK)
 # Before that, for textured triangles: edges from the first corner to the second and the third, how both uv sets change along
-# these edges; -1 where the back of the file's normals is seen.
+# these edges; -1 if the back of the file's normals is visible.
 AX, AY, AZ, UA0, VA0, UA1, VA1, BX, BY, BZ, UB0, VB0, UB1, VB1, SIDE = range(42 * BLOCK, 57 * BLOCK, BLOCK)
 # One light: unit direction to the light, irradiance on a plane that faces it, share its shadows leave, its angular radius.
 LX, LY, LZ, IR, IG, IB, SHARE, WIDTH = range(47 * BLOCK, 55 * BLOCK, BLOCK)
@@ -28,16 +28,16 @@ LX, LY, LZ, IR, IG, IB, SHARE, WIDTH = range(47 * BLOCK, 55 * BLOCK, BLOCK)
 DR, DG, DB, SR, SG, SB, FADE = range(55 * BLOCK, 62 * BLOCK, BLOCK)
 # Scratch, free between stages.
 T0, T1, T2, T3, T4, T5, T6, T7 = range(62 * BLOCK, 70 * BLOCK, BLOCK)
-# How a surface answers light (`kernels_light.weigh`): towards a light it mirrors FACE + EDGE times Schlick's power; LOBE and
+# The response of a surface to light (`kernels_light.weigh`): it mirrors a light by FACE + EDGE times Schlick's power; LOBE and
 # RIM integrate the lobe and the lobe times that power; BASE is its diffuse reflectance, TAKEN the share that the coat reflects,
 # THROUGH the share that a transmissive surface lets through, before its tint.
 FACE_R, FACE_G, FACE_B, EDGE_R, EDGE_G, EDGE_B, BASE_R, BASE_G, BASE_B = range(70 * BLOCK, 79 * BLOCK, BLOCK)
 LOBE, RIM, TAKEN, THROUGH = range(79 * BLOCK, 83 * BLOCK, BLOCK)
 # 1 on scenery, else 0.
 SCENERY = 83 * BLOCK
-# Position and shading normal in the axes in which what hides the sky was baked.
+# Position and shading normal in the axes in which sky occlusion was baked.
 OX, OY, OZ, ONX, ONY, ONZ = range(84 * BLOCK, 90 * BLOCK, BLOCK)
-# Light that things throw at the sample: radiance of a white matt surface, and of one that leans towards the mirrored ray; the
+# Light that things reflect onto the sample: radiance of a white matt surface, and of one leaning towards the mirrored ray; the
 # share of the sky's own light that it replaces, as far as probes know it, and 1 where it is all light, since a lightmap has it;
 # then what the nearest probes see, and from KEPT on their weights and place, see `kernels_bounce`. The last row is room for
 # vectors that begin in the row before.

@@ -69,14 +69,14 @@ from viewsphere.rendering.ground.kernels_slabs import shade
 f4 = nb.float32
 U = nb.uintp
 VERTEX = 16  # numbers
-# The rows to which the numbers of a vertex go (see `Surfaces.vertices`): for a point of a triangle, and for its edges.
+# The rows for the numbers of a vertex (see `Surfaces.vertices`): for a point of a triangle, and for its edges.
 ATTRIBUTES = {0: NX, 1: NY, 2: NZ, 3: U0, 4: V0, 5: U1, 6: V1, 7: RED, 8: GREEN, 9: BLUE, 10: ALPHA}
 DIFFERENCES = {3: UA0, 4: VA0, 5: UA1, 6: VA1, 11: AX, 12: AY, 13: AZ}
 
 
 @inner(fastmath=FAST)
 def _rays(view, count, own, b):
-    """Rays in the camera's axes, not normalised, into VX, VY, VZ: ray / inverse depth is the point seen."""
+    """Rays in the camera's axes, not normalised, into VX, VY, VZ: ray / inverse depth is the visible point."""
     if view.rays.shape[0] > 0:
         for i in range(U(count)):
             ray = view.rays[U(own[i])]
@@ -97,7 +97,7 @@ def _find_centers(columns, per, own, b):
     k = own[0]
     row = (k.real() * per).whole()
     column = k - row * columns
-    # A product of float32 may end up one row too far up or down.
+    # A product of float32 may be one row too high or too low.
     row, column = where(column < 0, row - 1, row), where(column < 0, column + columns, column)
     is_next = column >= columns
     row, column = where(is_next, row + 1, row), where(is_next, column - columns, column)
@@ -149,7 +149,7 @@ def _differ(typing, vertices, i, j, b, at):
 
 @intrinsic
 def _blend(typing, vertices, i, j, k, g, h, b, at):
-    """Row i of the vertices, moved by g towards row j and by h towards row k: its ATTRIBUTES, to b[row + at]."""
+    """The ATTRIBUTES of row i of the vertices, moved by g towards row j and by h towards row k, into b."""
 
     def code(context, builder, signature, arguments):
         rows, target = (context.make_array(signature.args[n])(context, builder, arguments[n]).data for n in (0, 6))
@@ -167,8 +167,8 @@ def _vertex(builder, vertices, row):
 
 @inner(fastmath=FAST)
 def gather(surfaces, count, triangle, b, own, material):
-    """For located samples: vertex attributes, edges, materials, normals on the viewer's side. The samples' triangles replace
-    their slots.
+    """Vertex attributes, edges, materials, and normals on the viewer's side, for located samples. The samples' triangles
+    replace their slots.
     """
     vertices, triangles, normals = surfaces.vertices, surfaces.triangles, surfaces.normals
     for i in range(U(count)):
@@ -205,7 +205,7 @@ def _find(b):
 
 @lanewise
 def _face_viewer(b):
-    """Turn both normals to the visible side, whatever the winding; the smooth one looks at the viewer at least a little."""
+    """Turn both normals to the visible side, for either winding; the smooth one faces the viewer at least slightly."""
     g, n = b.get(GX, GY, GZ), b.get(NX, NY, NZ)
     side = sign(dot(g, b.get(VX, VY, VZ)))
     g = tuple(x * side for x in g)
@@ -219,7 +219,8 @@ def _face_viewer(b):
 
 @inner(fastmath=FAST)
 def gather_ground(view, floor, count, b, material):
-    """As `gather`, for samples of the ground: its texture repeats in the world, and fades into the sky far behind all things.
+    """The equivalent of `gather` for samples of the ground: its texture repeats in the world, and fades into the sky far behind
+    all things.
 
     floor: see `painting.Baked`.
     """
@@ -233,7 +234,7 @@ def gather_ground(view, floor, count, b, material):
 
 @lanewise
 def _stand(eye, floor, b):
-    """Fill the rows of samples that lie on the ground."""
+    """Fill the rows of samples on the ground."""
     side = sign(b[VZ])
     for row in (NX, NY, GX, GY, U1, V1, BARY1, BARY2):
         b[row] = 0

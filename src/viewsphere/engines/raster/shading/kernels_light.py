@@ -1,8 +1,8 @@
 """The response of a surface to light: Lambert, GGX and a clear coat, lit by one light at a time and by the surroundings.
 
-A layered model with view-dependent weights (Turquin 2019; as Cycles' Principled BSDF). The share of a white surrounding that
-a layer reflects is taken from the layers below it. So a white surface in a white surrounding vanishes. Walter et al. 2007
-(GGX), Heitz 2014 (height-correlated Smith), Schlick 1994 (Fresnel), Karis 2013 (split sum, lights that have a size).
+A layered model with view-dependent weights (Turquin 2019; as Cycles' Principled BSDF). The share of a white surrounding that a
+layer reflects is subtracted from the layers below it. So a white surface in a white surrounding is invisible. Walter et al.
+2007 (GGX), Heitz 2014 (height-correlated Smith), Schlick 1994 (Fresnel), Karis 2013 (split sum, area lights).
 
 Order of the stages: `weigh`, then `add_light` for every light, `ambient`, `compose`.
 """
@@ -34,10 +34,10 @@ i4 = nb.int32
 U = nb.uintp
 
 COAT_F0 = np.float32(0.04)  # glTF's clear coat, index of refraction 1.5: ((1.5 - 1) / (1.5 + 1)) squared
-FULL_RIM = np.float32(50)  # one over the share mirrored straight on from which on a surface mirrors all light at its rim
-SMOOTHEST = np.float32(0.03)  # perceptual roughness, at least: in a perfect mirror a lamp would be a single point
-VIEWED = np.float32(0.25)  # squared roughness, as blurred as what probes see
-WIDE = np.float32(0.36)  # squared roughness from which on a lobe is as wide as a matt surface's
+FULL_RIM = np.float32(50)  # one over the share mirrored at normal incidence above which a surface mirrors all light at its rim
+SMOOTHEST = np.float32(0.03)  # minimum perceptual roughness: in a perfect mirror, a lamp would be a single point
+VIEWED = np.float32(0.25)  # squared roughness of a mirror as blurred as the probes' view
+WIDE = np.float32(0.36)  # squared roughness above which a lobe is as wide as a matt surface's
 BRIGHTEST = np.float32(60000.0)  # below 65,504, the greatest half float of EXR files
 UNEXPOSED = np.float32(1 / EXPOSURE)  # an unlit colour is shown unchanged by the exposure
 
@@ -51,7 +51,7 @@ _blend2, _blend4 = blend(2), blend(4)
 
 @inner(fastmath=FAST)
 def _any(count, row, b):
-    """Return whether a row has anything above 0. The loop counts, since the compiler vectorises a count."""
+    """Return whether a row has any value above 0. The loop counts, because the compiler vectorises a count."""
     found = 0
     for i in range(count):
         found += 1 if b[row + i] > f4(0) else 0
@@ -62,7 +62,7 @@ def _any(count, row, b):
 def _place_in_albedo(normal, rough, size, b):
     """T0: the first of four texels of the albedo around a layer's cosine to the viewer and roughness; T1 to T4: their weights.
 
-    Bilinear in the root of the cosine and in roughness. normal: row of the normal's x.
+    The look-up is bilinear in the root of the cosine and in roughness. normal: row of the normal's x.
     """
     x, y, z = b[normal], b[normal, BLOCK], b[normal, 2 * BLOCK]
     facing = x * b[VX] + y * b[VY] + z * b[VZ]
@@ -102,7 +102,7 @@ def _share_out(b):
     shares = []
     for k in range(0, 3 * BLOCK, BLOCK):
         base, f0 = b[RED + k], b[F0R + k]
-        # What mirrors nothing straight on mirrors nothing at its rim either (Lagarde and de Rousiers 2014).
+        # A surface without reflection at normal incidence has none at its rim either (Lagarde and de Rousiers 2014).
         edge = least(f0 * FULL_RIM, 1) - f0
         more, more_metal = body * (1 + f0 * lost), metal * (1 + base * lost)
         b[FACE_R + k] = left * (more * f0 + more_metal * base)
@@ -116,7 +116,7 @@ def _share_out(b):
 
 @inner
 def weigh(count, albedo, b):
-    """Divide the light among a sample's layers, for any light: fills FACE_R to THROUGH, clears DR to SB.
+    """Divide the light among a sample's layers, for any light: fill FACE_R to THROUGH, clear DR to SB.
 
     albedo: `Surrounding.albedo`.
     """
@@ -129,10 +129,10 @@ def weigh(count, albedo, b):
 
 
 def _lobe(b, normal, rough):
-    """Returns for one layer: the cosine towards a light, GGX times visibility times that cosine, Schlick's power.
+    """The factors of one layer: the cosine towards a light, GGX times visibility times that cosine, Schlick's power.
 
-    The light is a ball of angular radius WIDTH: the lobe is that of the ball's point nearest to the mirrored ray, dimmed by the
-    factor by which this enlarges the lobe: 1 + pi / 2 q + q^2 for q = WIDTH / 2 alpha.
+    The light is a ball of angular radius WIDTH. The lobe is evaluated at the ball's point nearest to the mirrored ray, and
+    divided by the factor by which the ball enlarges the lobe: 1 + pi / 2 q + q^2 for q = WIDTH / 2 alpha.
     """
     view, n, light = b.get(VX, VY, VZ), b.get(*normal), b.get(LX, LY, LZ)
     nv, nl = least(most(dot(n, view), 1e-3), 1), clamp(dot(n, light))
@@ -187,8 +187,8 @@ def add_light(count, b):
 
 @lanewise
 def _place(light, last, b):
-    """T0, T1: octahedral coordinates of the directions T0, T1, T2 (any length); LEVEL: the map of roughness T6; WEIGHT: how far
-    T6 lies from there to the next map. The matt map is level 0. last: the last level of roughness.
+    """T0, T1: octahedral coordinates of the directions T0, T1, T2 (any length); LEVEL: the map of roughness T6; WEIGHT: the
+    fraction of the way from this map to the next at which T6 is. The matt map is level 0. last: the last level of roughness.
     """
     cosine, sine = light.one(3 * TURN), light.one(3 * TURN + 1)
     east, north, z = b.get(T0, T1, T2)
@@ -209,7 +209,8 @@ def _place(light, last, b):
 
 @lanewise
 def _share_texels(b):
-    """FIRST to NEXT_UNDER: first texel and width of two maps, replaced by rows of the four texels, two by two, around T0, T1.
+    """Replace FIRST to NEXT_UNDER, the first texel and the width of two maps, by the rows of the four texels, two by two,
+    around T0, T1.
 
     T3 to T6 and A0 to A3: the weights of the texels in the two maps.
     """
@@ -245,7 +246,7 @@ def _read_texels(count, texels, b):
 
 @lanewise
 def _light(light, b):
-    """T3 to T5: radiance, from the map's radiance and the share T6 of it that lies below the horizon."""
+    """T3 to T5: radiance, from the map's radiance and the share T6 of it below the horizon."""
     share, bounce = b[T6], b[BOUNCE]
     down = where(b[LEVEL].equals(0), 1, clamp(-1.6 * b[T2]))
     down = down * down
@@ -257,11 +258,11 @@ def _light(light, b):
 
 @inner(fastmath=FAST)
 def light_around(count, surrounding, b):
-    """T3, T4, T5: radiance around the direction T0, T1, T2 for roughness T6 (-1: of a white matt surface facing that way).
+    """T3, T4, T5: radiance around the direction T0, T1, T2 for roughness T6 (-1 for a white matt surface facing that way).
 
-    It is the sum of the map's radiance, the even light from above, and the ground's light as far as it reaches the sample.
-    Lamps light only the ground close by: a mirrored ray that goes down but little sees none of their light. LEVEL is left: 0 if
-    matt.
+    It is the sum of the map's radiance, the uniform light from above, and the ground's light as far as it reaches the sample.
+    Lamps light only the ground close by, so a mirrored ray at a slight downward angle receives none of their light. LEVEL keeps
+    its value: 0 if matt.
     """
     levels = surrounding.levels
     _place(count, surrounding.light, f4(levels.shape[0] - 1), b)
@@ -282,7 +283,7 @@ def _mirror(normal, rough, b):
     n = b[normal], b[normal, BLOCK], b[normal, 2 * BLOCK]
     nv, r = clamp(dot(n, view)), clamp(b[rough])
     ray = tuple((nv + nv) * n[k] - view[k] for k in range(3))
-    # The shading normal may send the ray into the surface; cf. Lagarde and de Rousiers 2014 for both factors.
+    # The shading normal may direct the ray into the surface; cf. Lagarde and de Rousiers 2014 for both factors.
     out = most(1 + least(dot(ray, facet), 0), 0)
     open_, smooth = b[OPEN], (1 - r) * (1 - r)
     b[T7] = clamp(open_ + smooth * open_ * (1 - open_) * (nv + nv - 1.1)) * out * out
@@ -326,7 +327,7 @@ def _scatter(b):
 
 @lanewise
 def _scatter_bounced(b):
-    """`_scatter`, where GLOW has the light of the sky, too, as far as INSIDE and MAPPED say."""
+    """The equivalent of `_scatter` if GLOW includes the light of the sky, weighted by INSIDE and MAPPED."""
     for k in range(0, 3 * BLOCK, BLOCK):
         light = b[T3 + k] * b[OPEN] * (1 - most(b[INSIDE], b[MAPPED])) + b[GLOW_R + k]
         b[DR + k] = b[DR + k] + b[BASE_R + k] * light
@@ -341,14 +342,15 @@ def _shine(b):
 
 @lanewise
 def _shine_bounced(b):
-    """`_shine`, where light bounces: what probes see is as blurred as a mirror of roughness 0.5 shows it. The lobes of rougher
-    ones soon come close to that of a matt surface that leans towards the mirrored ray, whose light is in LEAN.
+    """The equivalent of `_shine` if light bounces: the probes' view is as blurred as in a mirror of roughness 0.5. The lobes of
+    rougher surfaces quickly become similar to that of a matt surface that leans towards the mirrored ray, whose light is in
+    LEAN.
     """
     lobe, rim, out, rough = b.get(LOBE, RIM, T7, ROUGH)
     wide, known = clamp((rough * rough - VIEWED) * (1 / (WIDE - VIEWED))), most(b[INSIDE], b[MAPPED])
     for k in range(0, 3 * BLOCK, BLOCK):
         light = b[T3 + k] * out
-        light = light + (b[LEAN_R + k] - light * known) * wide  # LEAN is as much less as it is known
+        light = light + (b[LEAN_R + k] - light * known) * wide  # LEAN is reduced by the share that is known
         b[SR + k] = b[SR + k] + (b[FACE_R + k] * lobe + b[EDGE_R + k] * rim) * light
 
 
@@ -378,7 +380,7 @@ def _look(count, layer, b):
 
 @inner(fastmath=FAST)
 def _take(count, layer, is_bounced, b):
-    """Add what a layer sends to the viewer of the light T3 to T5."""
+    """Add the part of the light T3 to T5 that a layer sends to the viewer."""
     if layer == MATT and is_bounced:
         _scatter_bounced(count, b)
     elif layer == MATT:
@@ -395,7 +397,7 @@ def _take(count, layer, is_bounced, b):
 
 @inner(fastmath=FAST)
 def _see(count, surrounding, bounces, is_near, b):
-    """T3 to T5: the light that comes from the direction T0 to T2, from things that light bounces off as well if `is_near`."""
+    """T3 to T5: the light from the direction T0 to T2; with `is_near`, including the light of things."""
     if is_near:
         columns = U(bounces.grid[2])
         near_light(count, bounces.views, columns, U(bounces.grid[1]) * columns, b)
@@ -406,11 +408,11 @@ def _see(count, surrounding, bounces, is_near, b):
 
 @inner(fastmath=FAST)
 def ambient(count, surrounding, bounces, b):
-    """Add the light of the surroundings to DR to SB; the block must be weighed before. Reads OPEN and BOUNCE, and where light
-    bounces what `kernels_bounce.bounced` fills.
+    """Add the light of the surroundings to DR to SB; the block must be weighed before. Reads OPEN and BOUNCE and, if light
+    bounces, the rows that `kernels_bounce.bounced` fills.
 
-    Leaves in T3 to T5 the light behind a transmissive surface, in BENT_X to BENT_Z that in the direction which they had, and
-    overwrites the rows of a light.
+    Afterwards, T3 to T5 have the light behind a transmissive surface, and BENT_X to BENT_Z the light from the direction that
+    they held. The rows of a light are overwritten.
     """
     has_coat, has_glass, is_bounced = _any(count, COAT, b), _any(count, THROUGH, b), bounces.grid[0] > 0
     is_bent = _any(count, BENT, b)
@@ -425,14 +427,14 @@ def ambient(count, surrounding, bounces, b):
 
 @lanewise
 def _keep_of_coat(b):
-    """T3 to T5 as far as the surface and what is around it do not block them."""
+    """T3 to T5, reduced by the shares that the surface and its surroundings block."""
     for k in range(0, 3 * BLOCK, BLOCK):
         b[T3 + k] = b[T3 + k] * b[T7]
 
 
 @inner(fastmath=FAST)
 def light_on_coat(count, surrounding, bounces, b):
-    """T3 to T5: the light that clear coats mirror, of a block of which `ambient` could be asked."""
+    """T3 to T5: the light that clear coats mirror, for a block that is ready for `ambient`."""
     _look(count, COATING, b)
     _see(count, surrounding, bounces, bounces.grid[0] > 0, b)
     _keep_of_coat(count, b)
@@ -464,20 +466,22 @@ def _compose(b):
 
 @inner
 def compose(count, b):
-    """Replace the base colour by what the sample sends to the viewer: RED, GREEN, BLUE premultiplied, ALPHA its opacity.
+    """Replace the base colour by the light that the sample sends to the viewer: RED, GREEN, BLUE premultiplied, ALPHA its
+    opacity.
 
-    Thin glass transmits the background by the least of its three tints; the excess of the other two tints, T0 to T2, takes its
-    light from the surroundings in the line of sight, T3 to T5, until `lay` puts the known background in their place. The
-    rougher the glass, the more of its light comes from the surroundings, and as far as BENT says all of it: from where solid
-    glass bends it. A mirrored image does not become transparent with the surface (glass made by alpha), unless the surface is
-    all but clear. Call `compose` right after `ambient`.
+    Thin glass transmits the background by the least of its three tints. For the excess of the other two tints, T0 to T2, the
+    light of the surroundings on the line of sight, T3 to T5, is used until `lay` replaces it by the known background. The
+    rougher the glass, the more of its light comes from the surroundings; the share BENT comes from the direction into which
+    solid glass refracts it. A mirrored image does not become transparent with the surface (glass made by alpha), unless the
+    surface is almost clear. Call `compose` right after `ambient`.
     """
     _compose(count, b)
 
 
 @inner(fastmath=FAST)
 def lay(pixel, i, b):
-    """Put a composed sample over what a pixel (4,) shows so far, premultiplied; coloured glass tints what lies behind it."""
+    """Composite a premultiplied, composed sample over the current value of a pixel (4,); coloured glass tints its background.
+    """
     under, behind = f4(1) - b[ALPHA + i], pixel[3]
     pixel[0] = max(pixel[0] * (under + b[T0 + i]) + b[RED + i] - behind * b[T0 + i] * b[T3 + i], f4(0))
     pixel[1] = max(pixel[1] * (under + b[T1 + i]) + b[GREEN + i] - behind * b[T1 + i] * b[T4 + i], f4(0))
@@ -494,7 +498,9 @@ def _add_matte(b):
 
 @inner
 def add_light_matte(count, b):
-    """`add_light` for a surface that only scatters, as plain ground; BASE_R, BASE_G, BASE_B are its colour."""
+    """The equivalent of `add_light` for a surface that only scatters, such as plain ground; BASE_R, BASE_G, BASE_B are its
+    colour.
+    """
     _add_matte(count, b)
 
 
@@ -515,7 +521,7 @@ def _open_matte_bounced(up, b):
 
 @inner
 def ambient_matte(count, surrounding, is_bounced, b):
-    """`ambient` for level ground that only scatters."""
+    """The equivalent of `ambient` for level ground that only scatters."""
     if is_bounced:
         _open_matte_bounced(count, surrounding.up, b)
     else:

@@ -1,4 +1,4 @@
-"""From samples to radiance: find which samples show what, shade every visible sample once, average edge pixels."""
+"""Kernels from samples to radiance: they sort samples by surface, shade each visible sample once, and average edge pixels."""
 
 from __future__ import annotations
 
@@ -54,8 +54,8 @@ from viewsphere.kernels.lanes import FAST, lanewise
 f4 = nb.float32
 U = nb.uintp
 NOTHING, SOLID, SEE_THROUGH, FLOOR = range(4)
-GLINT = 1.0  # radiance up to which a sample of an edge pixel counts in full, however dark its other samples are
-BRIGHT = 1.1  # radiance up to which a centre's colour stands for samples beside it: brighter glints on a crease are narrow
+GLINT = 1.0  # radiance up to which a sample of an edge pixel has full weight, even if its other samples are dark
+BRIGHT = 1.1  # radiance up to which a centre's colour is used for samples beside it: brighter glints on a crease are narrow
 # From a pixel to the centres nearest to each of its samples (`samples.OFFSETS`), three each.
 STEPS_X = (0, 0, -1, 0, 1, 0, 0, 0, 1, 0, -1, 0)
 STEPS_Y = (0, -1, 0, 0, 0, -1, 0, 1, 0, 0, 0, 1)
@@ -63,12 +63,12 @@ STEPS_Y = (0, -1, 0, 0, 0, -1, 0, 1, 0, 0, 0, 1)
 
 @njit
 def sorted_samples(triangle, kind, material, starts, radiance, solid, ground):
-    """Indices of the samples that show solid surfaces, those of one material together, and of the samples that show the ground.
+    """Indices of the samples that show solid surfaces, grouped by material, and of the samples that show the ground.
 
-    kind (T + 1,) uint8: of each triangle; the last, of triangle -1, is NOTHING. material (T,): each triangle's material. starts
-    (M + 1,): zeros, filled with the place where each material's samples end in `solid`. radiance (S, 4) is set to 0 except
-    where the ground is, since ground is not laid over anything. solid, ground (S,) int32 are filled; returns how many samples
-    each has.
+    kind (T + 1,) uint8: the kind of each triangle; the last entry, for triangle -1, is NOTHING. material (T,): each triangle's
+    material. starts (M + 1,): initially zeros, filled with the end of each material's samples in `solid`. radiance (S, 4) is
+    set to 0 except on the ground, since ground is not composited over anything. solid, ground (S,) int32 are filled; returns
+    the number of samples in each.
     """
     size, materials, grounds = U(triangle.shape[0]), U(starts.shape[0] - 1), U(0)
     i = U(0)
@@ -107,7 +107,7 @@ def sorted_samples(triangle, kind, material, starts, radiance, solid, ground):
 
 @inner(fastmath=FAST)
 def _start_catcher(count, b):
-    """DR and DG collect the light that arrives, and the light that would arrive if nothing stood on the catcher."""
+    """DR and DG collect the light that arrives, and the light that would arrive without any thing on the catcher."""
     for i in range(count):
         b[DR + i], b[DG + i], b[GROUND + i], b[AO + i] = f4(0), f4(0), f4(1), f4(1)
 
@@ -124,7 +124,7 @@ def _catch(count, b):
 
 @inner(fastmath=FAST)
 def _finish_catcher(count, surrounding, b):
-    """Make the catcher black, as opaque as the missing share of light."""
+    """Make the catcher black, with the missing share of light as its opacity."""
     even = (surrounding.up[0] + surrounding.up[1] + surrounding.up[2]) * f4(1 / 3)
     for i in range(count):
         all_light = b[DG + i] + even
@@ -141,7 +141,7 @@ def _finish_matte(b):
 
 @lanewise
 def start_matte(floor, b):
-    """Ground that only scatters: its colour, and its slabs' shade, which is the same in RED, GREEN and BLUE."""
+    """The colour of ground that only scatters, and its slabs' shade, which is the same in RED, GREEN and BLUE."""
     for k, row in enumerate((BASE_R, BASE_G, BASE_B)):
         b[row] = b[RED] * floor.one(5 + k)
     for row in (DR, DG, DB):
@@ -160,7 +160,9 @@ def _take(count, is_matte, b):
 
 @inner(fastmath=FAST)
 def _lay_all(start, count, is_ground, slots, radiance, b):
-    """Lay the composed samples over what is behind them; ground, which is behind all else, as far as it has not faded."""
+    """Composite the samples over their background; ground, which is behind everything else, is weighted by the share that has
+    not faded.
+    """
     if not is_ground:
         for i in range(count):
             lay(radiance[U(slots[start + i])], i, b)
@@ -177,8 +179,8 @@ def shade(
 ):
     """Shade the samples in `slots` (N,) int32 over `radiance` (S, 4) float32, premultiplied, in place.
 
-    triangle (S,) int32 and depth (S,) float32 (inverse) are what each sample shows; all slots show the ground, or none does.
-    floor: see `painting.Baked`; glass: what bends the light behind the samples.
+    triangle (S,) int32 and depth (S,) float32 (inverse) are those visible in each sample; all slots show the ground, or none
+    does. floor: see `painting.Baked`; glass: the solid glass that refracts the light behind the samples.
     """
     b = np.zeros(ROWS * BLOCK, np.float32)
     own, which = np.empty(BLOCK, np.int32), np.empty(BLOCK, np.int32)
@@ -217,7 +219,7 @@ def shade(
 
 @njit(fastmath=FAST, _nrt=True)
 def catch(view, floor, surrounding, lights, occlusion, slots, triangle, depth, radiance):
-    """As `shade`, for ground that is a shadow catcher."""
+    """The equivalent of `shade` for ground that is a shadow catcher."""
     b = np.zeros(ROWS * BLOCK, np.float32)
     own, which = np.empty(BLOCK, np.int32), np.empty(BLOCK, np.int32)
     for start in range(0, slots.shape[0], BLOCK):
@@ -248,12 +250,13 @@ def _alike(t, s, depth, other, owner, normals):
 
 @njit(_nrt=True)
 def shared_samples(pixels, triangle, depth, seen, inverse_depth, owner, normals, behind, radiance):
-    """Return the source of each sample's colour, four samples a pixel: the nearest similar pixel's centre, or the sample.
+    """Return the source of each sample's colour, four samples per pixel: the centre of the nearest similar pixel, or the
+    sample.
 
     Pixels marked in behind (H * W,), if `behind` is not empty, may have different backgrounds at their samples. So each of
     their samples has its own colour. seen, inverse_depth (H, W), radiance (H * W, 4): at the centres.
 
-    Returns like (4N,) and rows (R,). like: the centre's pixel, or ~k for a colour of its own, of sample k % 4 of row k // 4.
+    Returns like (4N,) and rows (R,). For sample k % 4 of row k // 4, like is the centre's pixel, or ~k for a colour of its own.
     rows: the pixels (indices in `pixels`) with such samples.
     """
     height, width = seen.shape
@@ -292,8 +295,8 @@ def shared_samples(pixels, triangle, depth, seen, inverse_depth, owner, normals,
 
 @njit
 def own_samples(rows, like, position, triangle, depth, places, shown, inverses, is_other):
-    """Fill places (4 R, 2), shown and inverses (4 R,) with the samples of these rows of pixels, as `shared_samples` found them.
-    Samples that have a colour of another kind show nothing, -1, and are marked in is_other (4 R,).
+    """Fill places (4 R, 2), shown and inverses (4 R,) with the samples of these rows of pixels, using the result of
+    `shared_samples`. Samples that share another colour show nothing, -1, and are marked in is_other (4 R,).
     """
     for r in range(U(rows.shape[0])):
         for i in range(U(4)):
@@ -307,8 +310,8 @@ def own_samples(rows, like, position, triangle, depth, places, shown, inverses, 
 def average_samples(pixels, like, samples, radiance):
     """Set each pixel to the mean of its four samples (premultiplied), whose colours `shared_samples` found.
 
-    A sample counts at most as GLINT, or as the darkest of the four where that is brighter, else glints would dot thin things.
-    Returns the indices in `pixels` of pixels with a dimmed glint (G,), and their true means (G, 3).
+    A sample is limited to GLINT, or to the darkest of the four if that is brighter; otherwise glints would appear as dots on
+    thin things. Returns the indices in `pixels` of pixels with a dimmed glint (G,), and their true means (G, 3).
     """
     means, whole = np.empty((pixels.shape[0], 4), np.float32), np.empty((pixels.shape[0], 3), np.float32)
     glints, count = np.empty(pixels.shape[0], np.int32), U(0)
@@ -341,13 +344,13 @@ def average_samples(pixels, like, samples, radiance):
 
 @njit(_nrt=True)
 def brighten_lines(pixels, means, width, radiance):
-    """Brighten pixels (G,) of radiance (H * W, 4) whose glints were dimmed towards their true means (G, 3), until they are as
-    bright as the second brightest pixel around: so a bright line keeps its brightness.
+    """Brighten pixels (G,) of radiance (H * W, 4) with dimmed glints towards their true means (G, 3), up to the brightness of
+    the second brightest pixel around. So a bright line keeps its brightness.
     """
     height, shares = radiance.shape[0] // width, np.empty(pixels.shape[0], np.float32)
     for i in range(U(pixels.shape[0])):
         p = U(pixels[i])
-        for c in range(U(3)):  # pixels around see the true means of one another
+        for c in range(U(3)):  # neighbouring pixels use each other's true means
             means[i, c], radiance[p, c] = radiance[p, c], means[i, c]
     for i in range(U(pixels.shape[0])):
         y, x, first, second = pixels[i] // width, pixels[i] % width, f4(0), f4(0)

@@ -1,6 +1,6 @@
-"""The parts of a picture's light, and its surfaces: as `kernels_paint.shade`, sample by sample, but kept apart.
+"""The parts of a picture's light, and its surfaces, computed sample by sample like `kernels_paint.shade`, but kept separate.
 
-Columns of a split (S, 6) or (S, 9): albedo, emitted light, and, where there is room, diffuse light; premultiplied.
+Columns of a split (S, 6) or (S, 9): albedo, emitted light, and, if there is room, diffuse light; premultiplied.
 """
 
 from __future__ import annotations
@@ -72,7 +72,7 @@ GLOSS = 13  # columns of `gloss`
 
 @lanewise
 def _part(b, p):
-    """The parts of samples that are lit, but not composed yet; nothing lights an unlit surface, which sends its colour."""
+    """The parts of samples that are lit but not composed yet. An unlit surface receives no light and sends its colour."""
     alpha, unlit = clamp(b[ALPHA]), b[UNLIT]
     share = alpha * (1 - unlit)
     shown = least(alpha * 8, 1) * (1 - unlit)
@@ -93,8 +93,8 @@ def _part_matte(b, p):
 
 @inner(fastmath=FAST)
 def _lay(start, count, is_ground, slots, b, p, out):
-    """Lay the parts over what is behind them, as `kernels_light.lay` lays the light; but what coloured glass tints beyond its
-    grey share is none of the parts of what is behind it.
+    """Composite the parts over their background, as `kernels_light.lay` does for light. The tint of coloured glass beyond its
+    grey share is not applied to the background's parts.
     """
     for i in range(U(count)):
         q = U(slots[U(start) + i])
@@ -129,7 +129,7 @@ def _light(start, count, slots, is_ground, is_matte, surrounding, lights, occlus
 def split(
     view, surfaces, textures, floor, surrounding, lights, occlusion, bounces, is_ground, slots, triangle, depth, glass, out
 ):
-    """Lay the parts of the samples in `slots` (N,) int32 over `out` (S, 6 or 9) float32; arguments as in `shade`."""
+    """Composite the parts of the samples in `slots` (N,) int32 over `out` (S, 6 or 9) float32; arguments as in `shade`."""
     b, p = np.zeros(ROWS * BLOCK, np.float32), np.zeros((COLUMNS + 1) * BLOCK, np.float32)
     own, which = np.empty(BLOCK, np.int32), np.empty(BLOCK, np.int32)
     is_matte, is_lit = is_ground and floor[4] == f4(1), out.shape[1] == COLUMNS
@@ -160,8 +160,8 @@ def split(
 
 @njit(fastmath=FAST, _nrt=True)
 def average_split(pixels, like, samples, radiance, parts, out):
-    """Set each pixel to the mean of its four samples' parts; `samples` and `radiance` are their colours, as
-    `kernels_paint.average_samples` is given them, which dims the glints of light in the same way.
+    """Set each pixel to the mean of its four samples' parts. `samples` and `radiance` are their colours, as in
+    `kernels_paint.average_samples`, which dims glints of light in the same way.
     """
     means = np.zeros((pixels.shape[0], out.shape[1]), np.float32)
     for i in range(pixels.shape[0]):
@@ -187,14 +187,14 @@ def _level(j, samples, radiance):
 
 @lanewise
 def _keep(b):
-    """Roughness without that of bumps too small to see, and metallic, both 0 where nothing lights the surface."""
+    """Roughness without the contribution of bumps too small to see, and metallic; both are 0 on unlit surfaces."""
     lit = 1 - b[UNLIT]
     b[ROUGH], b[METAL] = clamp(b[ROUGH]) * lit, clamp(b[METAL]) * lit
 
 
 @njit(fastmath=FAST, _nrt=True)
 def substance(view, surfaces, textures, floor, is_ground, slots, triangle, depth, out):
-    """Set rows `slots` of `out` (S, 2) float32 to the roughness and metallic of what the samples show."""
+    """Set rows `slots` of `out` (S, 2) float32 to the roughness and metallic of the samples' surfaces."""
     b = np.zeros(ROWS * BLOCK, np.float32)
     own, which = np.empty(BLOCK, np.int32), np.empty(BLOCK, np.int32)
     for start in range(0, slots.shape[0], BLOCK):
@@ -213,8 +213,8 @@ def substance(view, surfaces, textures, floor, is_ground, slots, triangle, depth
 
 @lanewise
 def _cover(b):
-    """The shares that base and coat mirror of light from where their mirror images are, into FACE_R to FACE_B; of what is unlit
-    nothing is seen that it mirrors.
+    """The shares of light from the directions of their mirror images that base and coat mirror, into FACE_R to FACE_B; 0 for
+    unlit surfaces.
     """
     lit = 1 - b[UNLIT]
     for k in range(0, 3 * BLOCK, BLOCK):
@@ -224,7 +224,7 @@ def _cover(b):
 
 @lanewise
 def _reflect(b):
-    """T0 to T2: the mirrored ray; one that a smooth normal sends into the surface is thrown back by the facet."""
+    """T0 to T2: the mirrored ray; if the smooth normal directs it into the surface, the facet reflects it."""
     view, normal, facet = b.get(VX, VY, VZ), b.get(NX, NY, NZ), b.get(GX, GY, GZ)
     twice = 2 * dot(normal, view)
     ray = tuple(twice * n - v for n, v in zip(normal, view, strict=True))
@@ -244,9 +244,10 @@ def _weigh_in_place(count, view, surfaces, textures, surrounding, occlusion, bou
 
 @njit(fastmath=FAST, _nrt=True)
 def gloss(view, surfaces, textures, floor, surrounding, occlusion, bounces, slots, triangle, depth, out):
-    """Set `out` (N, GLOSS) float32 to what the samples in `slots` (N,) mirror of their surroundings. Columns 0 to 2: its shares
-    of red, green and blue; 3 to 5: the light that they are taken to mirror; 6: the roughness; 7 to 9: where they are, in the
-    stage's lengths; 10 to 12: the mirrored ray, of length 1.
+    """Set `out` (N, GLOSS) float32 to the mirroring of the samples in `slots` (N,).
+
+    Columns 0 to 2: the mirrored shares of red, green and blue; 3 to 5: the light that they are assumed to mirror; 6: the
+    roughness; 7 to 9: their places, in the stage's lengths; 10 to 12: the mirrored ray, of length 1.
     """
     b = np.zeros(ROWS * BLOCK, np.float32)
     own, which = np.empty(BLOCK, np.int32), np.empty(BLOCK, np.int32)
@@ -268,7 +269,7 @@ def gloss(view, surfaces, textures, floor, surrounding, occlusion, bounces, slot
 
 @njit(fastmath=FAST, _nrt=True)
 def film(view, surfaces, textures, floor, surrounding, occlusion, bounces, slots, triangle, depth, out):
-    """Set `out` (N, 4) float32 to the light that the clear coat of the samples in `slots` (N,) is taken to mirror, and to the
+    """Set `out` (N, 4) float32 to the light that the clear coat of the samples in `slots` (N,) is assumed to mirror, and to the
     share of all light that it mirrors.
     """
     b = np.zeros(ROWS * BLOCK, np.float32)

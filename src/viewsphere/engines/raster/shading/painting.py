@@ -35,14 +35,14 @@ NO_SPLIT = np.zeros((0, 0), np.float32)
 
 @dataclass(frozen=True, eq=False)
 class Baked:
-    """The data from which pictures are painted; lengths are in `unit`s from `origin`.
+    """The data from which pictures are painted; lengths are in `unit`s, relative to `origin`.
 
     floor (13,): the ground's texture repeats per length, its texture coordinates at the origin, its material, 1 if the ground
-    only scatters or 2 if it is a shadow catcher, its colour; the middle of all things, and one over half their size; its
-    slabs in a repeat, 0 for none. kind (T + 1,) uint8: of each triangle, see `kernels_paint`; owner (T,) int32: equal where
-    neighbouring triangles look alike; see_through (T + 1,). blended: `with_blended_colors`. bounce_scene: the surfaces that
-    throw the light of `bounces`, None if no light bounces; tree: of the bounce scene's triangles; is_fine: whether rays from
-    each sample find near surfaces, and the reflections in rough mirrors.
+    only scatters or 2 if it is a shadow catcher, its colour; the middle of all things, and one over half their size; its slabs
+    in a repeat, 0 for none. kind (T + 1,) uint8: the kind of each triangle, see `kernels_paint`; owner (T,) int32: equal for
+    neighbouring triangles that look alike; see_through (T + 1,). blended: `with_blended_colors`. bounce_scene: the surfaces
+    that reflect the light of `bounces`, None if no light bounces; tree: that of the bounce scene's triangles; is_fine: whether
+    rays from each sample find near surfaces, and the reflections in rough mirrors.
     """
 
     geometry: Geometry
@@ -85,11 +85,11 @@ def paint(
 ) -> None:
     """Fill `radiance` (H * W, 4) float32: scene-linear, premultiplied; alpha is the covered share of the pixel.
 
-    All is seen through `fog`; if that `is_outdoors` of a room, only sky and ground are. `more` adds to the light of the pixels'
-    centres what surfaces mirror.
+    Everything is seen through `fog`; if the fog `is_outdoors` of a room, it covers only sky and ground. `more` adds mirrored
+    light to the light of the pixels' centres.
 
-    Edge pixels are the mean of four samples. Uncovered pixels show the sky if `has_sky`, else 0. `split`, if it is not empty,
-    is filled with the parts of this light, (H * W, 6 or 9) float32 as `kernels_split` has them; it must be 0 before.
+    Edge pixels are the mean of four samples. Uncovered pixels show the sky if `has_sky`, otherwise 0. `split`, if it is not
+    empty, is filled with the parts of this light, (H * W, 6 or 9) float32 as in `kernels_split`; it must be 0 before.
     """
     baked.rows.write_seen(camera, visibility, baked.geometry)
     view = view_of(baked, camera)
@@ -110,7 +110,7 @@ def paint(
 
 
 def materials(baked: Baked, camera: Camera, visibility: Visibility) -> Float32:
-    """Roughness and metallic of what a camera's pixel centres see, (H * W, 2) float32; 0 for nothing and a shadow catcher."""
+    """Roughness and metallic at a camera's pixel centres, (H * W, 2) float32; 0 for no surface and for a shadow catcher."""
     baked.rows.write_seen(camera, visibility, baked.geometry)
     view, out = view_of(baked, camera), np.zeros((visibility.triangle.size, 2), np.float32)
     triangle, depth = visibility.triangle.reshape(-1), visibility.inverse_depth.reshape(-1)
@@ -135,8 +135,8 @@ def _smooth(
     fog: Fog | None,
     is_outdoors: bool,
 ) -> None:
-    """Set edge pixels to the mean of their samples. Samples are shaded only if they look like no centre of a pixel around, or
-    lie in pixels marked in `behind`.
+    """Set edge pixels to the mean of their samples. Samples are shaded only if they look like no neighbouring pixel's centre,
+    or are in pixels marked in `behind`.
     """
     shown, centres = (samples.triangle, samples.inverse_depth), (visibility.triangle, visibility.inverse_depth)
     surfaces = baked.owner, baked.surfaces.normals
@@ -177,8 +177,8 @@ def shade_all(
     air: Air | None = None,
     more: Callable[[Float32], None] | None = None,
 ) -> list[Layer]:
-    """Fill `radiance` (S, 4) with what the samples show, surfaces behind see-through ones first, and `split` with its parts,
-    if it is not empty; each surface is seen through the air before it. Returns the layers.
+    """Fill `radiance` (S, 4) with the light of the samples, surfaces behind see-through ones first, and `split`, if it is not
+    empty, with its parts. Each surface is seen through the air in front of it. Returns the layers.
     """
     solid, ground = np.empty((2, len(triangle)), np.int32)
     materials = baked.surfaces.material, np.zeros(len(baked.surfaces.looks) + 1, np.uint64)
@@ -187,10 +187,10 @@ def shade_all(
     _shade_some(baked, view, ground[:grounds], True, triangle, depth, radiance, split)
     if more is not None:
         more(radiance)
-    # Layers are listed also where a solid surface is in front: a decal may lie on that surface.
+    # Layers are also listed if a solid surface is in front, because a decal may be on that surface.
     pixels = None if samples is None else samples.pixels
     stack = layers(baked.blended, camera, triangle, depth, baked.see_through, pixels, visibility.corners)
-    reached = depth.copy()  # 1/depth up to which light has come
+    reached = depth.copy()  # 1/depth up to which light has been attenuated
     first, behind = _nearest_glass(baked, stack, len(triangle)), triangle
     for i, layer in enumerate(stack):
         if air is not None and i > 0:
@@ -219,7 +219,7 @@ def _veiled(baked: Baked, air: Air, slots: Int32, behind: Int32, inverse_depth: 
 
 
 def _nearest_glass(baked: Baked, stack: list[Layer], count: int) -> NDArray[np.uint8]:
-    """Of each sample (S,): in which layer it sees solid glass first, their number where in none."""
+    """The number of the layer in which each sample (S,) first sees solid glass; the number of layers if it sees none."""
     first = np.full(count, len(stack), np.uint8)
     if len(baked.glass.corners):
         bends = baked.surfaces.looks[:, L_BENDS] > 0

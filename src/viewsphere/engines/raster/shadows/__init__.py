@@ -1,1 +1,1 @@
-"""Light of the sun and lamps that arrives, and occlusion: shadow maps, soft shadows, ambient occlusion."""
+"""Direct light of the sun and lamps, and occlusion: shadow maps, soft shadows, ambient occlusion."""

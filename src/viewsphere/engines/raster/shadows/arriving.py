@@ -1,4 +1,4 @@
-"""Irradiance of a light on level ground, place by place, for the maps of the ground that are baked once."""
+"""Irradiance of a light on level ground, place by place, for the baked maps of the ground."""
 
 from __future__ import annotations
 
@@ -15,8 +15,9 @@ from viewsphere.engines.raster.shadows.shadow_maps import Lights
 def arriving(
     lights: Lights, which: int, places: NDArray[np.floating[Any]], width: float | NDArray[np.floating[Any]]
 ) -> tuple[Float32, Float32]:
-    """Unshadowed irradiance (N, 3) at places (N, 3) that face up, `width` apart, one or of each (N,); the share (N,) that
-    shadows leave of it.
+    """Unshadowed irradiance (N, 3) at places (N, 3) that face up, and the share (N,) of it that shadows leave.
+
+    `width` is the distance between places: one number, or one for each (N,).
     """
     found = np.empty((5, len(places)), np.float32)
     widths = np.full(len(places), width, np.float32)

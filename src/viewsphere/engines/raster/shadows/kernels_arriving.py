@@ -14,9 +14,9 @@ U = nb.uintp
 
 @njit(_nrt=True)
 def arrive_on_ground(lights, k, places, widths, found):
-    """Fill found (5, N): z of the direction to light k, its unshadowed irradiance, the share that shadows leave.
+    """Fill found (5, N): z of the direction to light k, its unshadowed irradiance, and the share that shadows leave.
 
-    places (3, N); widths (N,): how far each place is from the next one.
+    places (3, N); widths (N,): the distance of each place from the next one.
     """
     b = np.zeros(ROWS * BLOCK, np.float32)
     b[NZ : NZ + BLOCK] = 1

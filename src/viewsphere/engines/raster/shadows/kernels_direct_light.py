@@ -1,7 +1,7 @@
 """The share of each light that arrives at a block's samples: distance, cone, and shadows that soften with distance.
 
-Most samples are either before everything near them in the shadow map, or behind it. Planes that enclose each cell of the map
-decide between the two. Only the other samples search the map for blockers.
+Most samples are either in front of everything near them in the shadow map, or behind it. Planes that enclose each cell of the
+map decide between the two. Only the other samples search the map for blockers.
 
 Area lights: the light vector of a polygon (Lambert 1760).
 """
@@ -29,11 +29,11 @@ from viewsphere.kernels.jit import inner, njit
 f4 = nb.float32
 U = nb.uintp
 DISTANT, POINT, SPOT, AREA = 0, 1, 2, 3
-# Rows in use while a view is looked at, in addition to those of `kernels_soft_shadows`.
+# Rows in use while a view is evaluated, in addition to those of `kernels_soft_shadows`.
 CELL, OFF_U, OFF_V, DOWN_, OWN = U0, V0, U1, V1, PROBES
 LOW_, HIGH_, ACROSS_ = CELL, OFF_U, OFF_V
-BLUNTEST = 16.0  # texels: half width of a filter that a pixel's size asks for, at most
-GRAZING = 0.02  # a plane's slope in a map is limited to that seen by a light this far above the plane (sine)
+BLUNTEST = 16.0  # texels: maximum half width of a filter that follows from a pixel's size
+GRAZING = 0.02  # a plane's slope in a map is limited to the slope for a light this far above the plane (sine)
 
 
 def _seen(row, first, x, y, z):
@@ -43,7 +43,7 @@ def _seen(row, first, x, y, z):
 
 @inner
 def _count_on(count, b):
-    """Return the number of samples with light left that lie on a view's map."""
+    """Return the number of samples with light left that are on a view's map."""
     found = 0
     for i in range(count):
         found += 1 if b[STATE + i] == f4(-1) else 0
@@ -67,7 +67,7 @@ def _see(row, b):
 
 @lanewise
 def _project(row, b):
-    """U and V in texels, Q, its slopes, Q less the bias, the least filter and the first RADIUS."""
+    """U and V in texels, Q, its slopes, Q minus the bias, the minimum filter and the first RADIUS."""
     normal, inverse, on = b.get(GX, GY, GZ), b[SOFT], b[STATE].equals(-1)
     texels, middle = row.one(TEXELS), row.one(MIDDLE)
     q = where(on, _seen(row, 8, *b.get(PX, PY, PZ)) * inverse, 0)
@@ -82,7 +82,9 @@ def _project(row, b):
 
 @lanewise
 def _find_cells(side, b):
-    """CELL: the cell that holds all within RADIUS of each sample; OFF_U, OFF_V: the sample's place from the cell's middle."""
+    """CELL: the cell that contains everything within RADIUS of each sample; OFF_U, OFF_V: the sample's place relative to the
+    cell's middle.
+    """
     u, v, radius = b.get(U_, V_, RADIUS)
     # The power of two that is at most the radius: a cell's step is four times that power.
     level = least(most(power(radius), 1), side)
@@ -94,7 +96,7 @@ def _find_cells(side, b):
 
 @inner(fastmath=FAST)
 def _read_cells(count, at, bounds, b):
-    """The two planes of each sample's cell, evaluated at the sample, and their slopes; they replace CELL, OFF_U, OFF_V."""
+    """The two planes of each sample's cell, evaluated at the sample, and their slopes, which replace CELL, OFF_U, OFF_V."""
     for i in range(U(count)):
         k = at + U(nb.int32(b[U(CELL) + i]))
         across, down = bounds[k, U(ACROSS)], bounds[k, U(DOWN)]
@@ -105,7 +107,7 @@ def _read_cells(count, at, bounds, b):
 
 @lanewise
 def _judge(row, b):
-    """STATE of samples before all texels within RADIUS (1) or behind all of them (0); a smaller RADIUS for the others."""
+    """STATE of samples in front of all texels within RADIUS (1) or behind all of them (0); a smaller RADIUS for the others."""
     near, radius, across, down, low = b.get(NEAR, RADIUS, ACROSS_, DOWN_, LOW_)
     tilt = (size(across - b[DU]) + size(down - b[DV])) * (radius + 0.5)
     b[STATE] = where(near + tilt <= low, 1, where(near - tilt > b[HIGH_], 0, -1))
@@ -115,7 +117,7 @@ def _judge(row, b):
 
 @inner
 def _gather_on(count, b):
-    """Move the samples on the map to the front of the block; OWN keeps where each came from."""
+    """Move the samples on the map to the front of the block; OWN stores the original place of each."""
     left = U(0)
     for i in range(U(count)):
         if b[U(STATE) + i] == f4(-1):
@@ -125,14 +127,14 @@ def _gather_on(count, b):
 
 @inner
 def _all_on(count, b):
-    """As `_gather_on`, where all samples are on the map."""
+    """The equivalent of `_gather_on` if all samples are on the map."""
     for i in range(count):
         b[OWN + i] = f4(i)
 
 
 @inner
 def _settle(count, b):
-    """Put what is decided into SHARE and FACING, and move the undecided samples to the front; returns their number."""
+    """Store decided results in SHARE and FACING, and move the undecided samples to the front; return their number."""
     left = U(0)
     for i in range(U(count)):
         state, own = b[U(STATE) + i], U(nb.int32(b[U(OWN) + i]))
@@ -147,7 +149,7 @@ def _settle(count, b):
 
 @inner
 def _move(i, to, b):
-    """Move all that is known of a sample on the map to row position `to`; returns the position after it."""
+    """Move all data of a sample on the map to row position `to`; return the position after it."""
     for row in range(U(U_), U(SOFT + 1), U(BLOCK)):
         b[row + to] = b[row + i]
     b[U(RADIUS) + to] = b[U(RADIUS) + i]
@@ -174,7 +176,7 @@ def _from_area(place, axis, right, up, radius, b):
     scale = 0.125 / most(root(across * along), 1e-12)
     light = tuple((a + b + c + d) * scale for a, b, c, d in zip(*edges, strict=True))
     turn = where(dot(light, straight) < 0, -1, 1)
-    # In the rectangle's own plane rounding errors would decide between all of the rectangle's light and none.
+    # In the rectangle's own plane, rounding errors would decide between full light and none.
     turn = where(front > wide * 1e-3, turn * close, 0)
     far = front / most(squared, radius * radius * 0.01) * (1 - close)
     light = tuple(p * turn + s * far for p, s in zip(light, straight, strict=True))
@@ -192,7 +194,7 @@ def _unit(way):
 
 
 def _edge(a, b):
-    """One edge's part of a polygon's light vector: the arc's length about the plane through both unit vectors."""
+    """The contribution of one edge to a polygon's light vector: the arc's length about the plane through both unit vectors."""
     c = dot(a, b)
     y = least(size(c), 1)
     # Arc cosine: Abramowitz and Stegun 4.4.45.
@@ -225,7 +227,8 @@ def _from_afar(place, radius, b):
 
 @lanewise
 def _turn(place, near, b):
-    """Fill SHARE, before any shadow: the share of the light that the surface's tilt leaves; FACING, of samples that have light.
+    """Fill SHARE, before any shadow, with the share of the light that the surface's tilt leaves; fill FACING of samples that
+    have light.
 
     near: 1 for a light at a place, 0 for a distant one. The views look from a rectangle's middle, but most of a rectangle's
     light may come from another part of it.
@@ -247,10 +250,10 @@ def _shine(color, b):
 
 @inner(fastmath=FAST)
 def look(count, form, grid, depth, bounds, k, b):
-    """Multiply SHARE by the share of its light that view k (uintp) of these `Views` lets through, where samples are on its map.
+    """Multiply SHARE by the share of its light that view k (uintp) of these `Views` lets through, for samples on its map.
 
-    FACING holds the cosine between the surface and the light, times the distance to a light at a place; the view sets FACING to
-    0 where it has decided, and changes nothing where FACING is not above 0. (GX, GY, GZ) may be zero where there is no surface.
+    FACING holds the cosine between the surface and the light, times the distance to a light at a place. The view sets FACING to
+    0 for decided samples, and changes nothing if FACING is not above 0. (GX, GY, GZ) may be zero if there is no surface.
     """
     row, places = form[k], grid[k]
     _see(count, row, b)
@@ -277,9 +280,8 @@ def look(count, form, grid, depth, bounds, k, b):
 def arrive(count, lights, k, b):
     """Fill LX..LZ, IR..IB, SHARE and WIDTH of a block for light k.
 
-    The irradiance is that of a plane facing the light, without shadows; SHARE is the share that shadows leave. Where normals
-    are smooth, a facet that is turned away a little is lit like its neighbours: seen from afar, bumps have no lit or dark
-    sides.
+    The irradiance is that of a plane facing the light, without shadows; SHARE is the share that shadows leave. With smooth
+    normals, a facet that faces away slightly is lit like its neighbours: from afar, bumps have no lit or dark sides.
     """
     k = U(k)
     kind, place, radius = lights.kind[k], lights.place[k], lights.radius[k]

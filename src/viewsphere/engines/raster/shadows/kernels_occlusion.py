@@ -1,11 +1,11 @@
-"""The share of the sky that a place can see: volumes around the things that hide it, maps of the ground below, and look-ups.
+"""The share of the sky that is visible from a place: volumes around occluding things, maps of the ground below, and look-ups.
 
-In a still picture all targets share one volume and one map. In a sequence each target has its own, which move along with it.
-Several targets together leave the product of their single shares (Malmer, Malmer, Assarsson and Holzschuch 2007).
+In a still picture, all targets share one volume and one map. In a sequence, each target has its own, which move along with it.
+The shares of several targets are multiplied (Malmer, Malmer, Assarsson and Holzschuch 2007).
 
 A cell of the volume has values for the directions above the horizon, and for the directions below. The values are the visible
-share m of the sphere and the mean v of the visible directions. They are the spherical harmonics up to degree 1 (Ramamoorthi
-and Hanrahan 2001). The cosine-weighted share that a surface with normal n can see is m + 2 v . n.
+share m of the sphere and the mean v of the visible directions. They are the spherical harmonics up to degree 1 (Ramamoorthi and
+Hanrahan 2001). The cosine-weighted share that a surface with normal n can see is m + 2 v . n.
 """
 
 from __future__ import annotations
@@ -58,18 +58,18 @@ i4 = nb.int32
 U = nb.uintp
 _blend2, _blend8 = blend(2), blend(8)
 SKY, LIGHT, WITHIN, PLACE = LX, LY, LZ, IR  # rows of a light, in use before the first light
-ABOVE, BELOW = OPENX, OPENY  # OPEN and BOUNCE as far as one volume says
+ABOVE, BELOW = OPENX, OPENY  # OPEN and BOUNCE from one volume alone
 COEFFICIENTS = 8
-BEHIND = 0.02  # least weight of a point of the volume that lies behind the surface
-HIDDEN = 0.03  # a cell that sees a smaller share lies within a solid thing
-GAIN = 1.04  # makes up for the directions that a plane's own horizon hides: on the sphere each stands for a wide cone
-CLEAR = 3.0  # thirds of a height, about: from above a target's top on its sequence misses no light of the ground
-HORIZON = 0.03  # keeps the ratio from being noise where the surface hardly faces the sky
+BEHIND = 0.02  # minimum weight of a point of the volume behind the surface
+HIDDEN = 0.03  # a cell that sees a smaller share is inside a solid thing
+GAIN = 1.04  # compensates for the directions that a plane's own horizon hides: each represents a wide cone of the sphere
+CLEAR = 3.0  # about thirds of a height: above a target's top, its sequence misses no light of the ground
+HORIZON = 0.03  # keeps the ratio from becoming noise if the surface hardly faces the sky
 
 
 @njit
 def see(points, views, directions, b, out):
-    """For each point (N, 3) the visible share and mean direction, above the horizon and below, into out (N, 8).
+    """Write the visible share and mean direction for each point (N, 3), above the horizon and below, into out (N, 8).
 
     b (ROWS * BLOCK,) is scratch.
     """
@@ -154,9 +154,9 @@ def _read_floor(count, floor, frame, b):
 
 @lanewise
 def _place_in_volume(frame, columns, rows, layers, b):
-    """PLACE: the first of the eight points of the volume around a place a little off the surface; T0 to T7: their weights.
+    """PLACE: the first of the eight points of the volume around a place slightly off the surface; T0 to T7: their weights.
 
-    WITHIN: how far inside the volume that place is, 0..1.
+    WITHIN: the depth of that place inside the volume, 0..1.
     """
     normal, cells, push = b.get(ONX, ONY, ONZ), frame.one(3), frame.one(4)
     own = [(b[OX + k * BLOCK] - frame.one(k)) * cells for k in range(3)]
@@ -178,7 +178,7 @@ def _place_in_volume(frame, columns, rows, layers, b):
             near_by = part[axis] if is_next else 1 - part[axis]
             share = near_by if share is None else share * near_by
             before = before + normal[axis] if is_next else before
-        # A point behind the surface sees other things than the surface does.
+        # A point behind the surface has a different view from the surface.
         shares.append(share * least(most(before, BEHIND), 1))
     scale = 1 / most(sum(shares[1:], shares[0]), 1e-6)
     b.put((T0, T1, T2, T3, T4, T5, T6, T7), [share * scale for share in shares])
@@ -186,7 +186,7 @@ def _place_in_volume(frame, columns, rows, layers, b):
 
 @inner
 def _read_volume(count, volume, grid, frame, b):
-    """The volume's coefficients into T0..T7: read a little off each sample's surface, from points in front of it."""
+    """The volume's coefficients into T0..T7, read slightly off each sample's surface, from points in front of it."""
     first, layers, rows, columns = U(grid[0]), U(grid[1]), U(grid[2]), U(grid[3])
     _place_in_volume(count, frame, f4(columns), f4(rows), f4(layers), b)
     for i in range(count):
@@ -211,7 +211,7 @@ def _shares(has_ground, b):
 
 @lanewise
 def _near_floor(frame, b):
-    """The ground beside the targets sends up less light; scenery that serves as this ground is darkened like the ground."""
+    """Reduce the light from the ground beside the targets; scenery that serves as this ground is darkened like the ground."""
     height = (b[OZ] - frame.one(3)) / (0.35 * frame.one(4))
     light, sky, above = b[LIGHT], b[SKY], b[ABOVE]
     lost = b[BELOW] * (1 - (light + (1 - light) * 0.6 * clamp(height)))
@@ -244,7 +244,7 @@ def _darken(b):
 
 @inner
 def _hide(count, occlusion, k, is_ground, b):
-    """ABOVE and BELOW: what volume and map k leave."""
+    """ABOVE and BELOW: the shares that volume and map k leave."""
     grounded = occlusion.floor_frame[k, U(5)] > f4(0)
     _turn(count, occlusion.pose[k], b)
     if grounded:
@@ -260,13 +260,13 @@ def _hide(count, occlusion, k, is_ground, b):
 
 @inner
 def occlude(count, occlusion, b):
-    """Fill OPEN and BOUNCE of a block of samples, either all of the ground or none (row GROUND of the first sample says which).
+    """Fill OPEN and BOUNCE of a block of samples, either all on the ground or none (row GROUND of the first sample tells).
 
-    With a ground, OPEN is the share of the cosine-weighted upper sky, BOUNCE that of the ground's light; without one both are
-    the share of the whole hemisphere above the surface. The occlusion texture (row AO) is in both.
+    With a ground, OPEN is the share of the cosine-weighted upper sky, and BOUNCE that of the ground's light. Without one, both
+    are the share of the whole hemisphere above the surface. Both include the occlusion texture (row AO).
     """
     hiders, is_ground = U(occlusion.frame.shape[0]), b[GROUND] > f4(0)
-    # To bound a block costs as much as one volume's share of a still picture saves.
+    # Bounding a block costs as much as it saves for the one volume of a still picture.
     box = _bound(count if hiders > U(1) else U(0), b)
     _begin(count, b)
     for k in range(hiders):

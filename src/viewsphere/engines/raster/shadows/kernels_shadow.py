@@ -1,4 +1,4 @@
-"""Shadow maps: the surface nearest to a light in each direction, drawn once a stage."""
+"""Shadow maps: the surface nearest to a light in each direction, drawn once per stage."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ U = nb.uintp
 # to the light and is linear in u and v on every plane: the distance itself for a distant light, -1 / distance for a near one.
 
 STEP = 4  # texels from one of the finest cells to the next; each cell is two steps wide
-COARSEST = 16  # texels a side that a map's coarsest level has at least
-LEVELS = 12  # of depths: a map of 16 texels, doubled eleven times, is 32,768 texels wide, more than any map
+COARSEST = 16  # minimum texels per side of a map's coarsest level
+LEVELS = 12  # levels of depths: a map of 16 texels, doubled eleven times, is 32,768 texels wide, more than any map
 GAP = 16  # unused texels between rows: without them the rows of a window would push each other out of the cache
 STEEP = 15.0  # biases: steeper slopes in a cell are given up. Chosen with the biases, not measured alone
-WIDE = 16  # texels of a row from which on it is worth to find out which of them a triangle covers
+WIDE = 16  # texels of a row above which computing the covered part is worthwhile
 ROUNDING = 1e-14  # some 50 units in the last place of a double: the error of the few sums before it
 # Columns of Views.form: four rows of the matrix, then those that `kernels_direct_light.look` reads: texels per length (at
 # distance 1), the bias in q of a distant light and in shares of q of a near one, the least q in the map, how far from the
@@ -44,7 +44,7 @@ LOW, HIGH, ACROSS, DOWN = range(4)
 
 @inner
 def _alpha(surfaces, textures, t, g, h):
-    """Alpha of triangle t where its second and third corner weigh g and h."""
+    """Alpha of triangle t at the weights g and h of its second and third corner."""
     i, j, k = surfaces.triangles[t]
     va, vb, vc = surfaces.vertices[i], surfaces.vertices[j], surfaces.vertices[k]
     m, f = surfaces.material[t], f4(1) - g - h
@@ -56,8 +56,8 @@ def _alpha(surfaces, textures, t, g, h):
 
 @njit
 def see_vertices(vertices, base, matrix, corners):
-    """(N, 4): a view's matrix times the places of as many of `Surfaces.vertices`, from `base` on. Without BLAS, whose threads
-    wait for one another on busy cores.
+    """(N, 4): a view's matrix times the places of `Surfaces.vertices` from `base` on, N of them. It does not use BLAS, whose
+    threads wait for one another on busy cores.
     """
     for i in range(U(corners.shape[0])):
         v = U(base) + i
@@ -68,7 +68,7 @@ def see_vertices(vertices, base, matrix, corners):
 
 @inner
 def _reach(corners, i, j, k, near, axis):
-    """Least and greatest place along an axis of a triangle's part in front of the near plane, in texels from the middle."""
+    """Lowest and highest place along an axis of a triangle's part in front of the near plane, in texels from the middle."""
     low, high = np.inf, -np.inf
     for step in range(3):
         p, q = (i, j) if step == 0 else ((j, k) if step == 1 else (k, i))
@@ -84,7 +84,7 @@ def _reach(corners, i, j, k, near, axis):
 
 @inner
 def _between(a, b, c, low, high):
-    """The part of [low, high] in which a x + b + c may be 0 or more, and what rounding may add to it."""
+    """The part of [low, high] in which a x + b + c may be 0 or more, including rounding errors."""
     if a == 0.0:
         return low, high
     at = -(b + c) / a
@@ -96,11 +96,11 @@ def _between(a, b, c, low, high):
 
 @njit
 def draw_depth(corners, base, surfaces, textures, begin, tilt, nearest, farthest):  # noqa: PLR0912, PLR0915, one loop
-    """Draw q of all triangles at the texels' centres: the least into nearest (n, n + GAP), the greatest into farthest.
+    """Draw q of all triangles at the texels' centres: the minimum into nearest (n, n + GAP), the maximum into farthest.
 
-    corners (N, 4) float64: the vertices from `base` on seen from a view. Only points with w >= begin are drawn, or, where
-    `tilt` is one over the squared texels per length, points at least that far from the eye; and only where a surface's alpha
-    reaches its material's L_CASTS_FROM. farthest may be (0, 0) if it is not needed.
+    corners (N, 4) float64: the vertices from `base` on in the axes of a view. Only points with w >= begin are drawn; if `tilt`
+    is one over the squared texels per length, only points at least that far from the eye. In addition, a surface's alpha must
+    reach its material's L_CASTS_FROM. farthest may be (0, 0) if it is not needed.
     """
     size = nearest.shape[0]
     half, last = 0.5 * size, size - 1.0
@@ -168,7 +168,7 @@ def draw_depth(corners, base, surfaces, textures, begin, tilt, nearest, farthest
 
 @njit
 def finish_view(grid, form, depth, bounds):
-    """Fill the bounds of a view's drawn map; returns its smallest q.
+    """Fill the bounds of a view's drawn map; return its smallest q.
 
     bounds (M, 4) are (inf, -inf, 0, 0) before: empty cells.
     """
@@ -180,7 +180,7 @@ def finish_view(grid, form, depth, bounds):
 
 @inner
 def _find_slopes(grid, depth, far, near, bounds):
-    """ACROSS and DOWN of the finest cells: slopes of the first STEP x STEP texels if they may be one surface, else NaN."""
+    """ACROSS and DOWN of the finest cells: slopes of the first STEP x STEP texels if they may be one surface, otherwise NaN."""
     size, side, stride, last = grid[SIZE], grid[CELLS], grid[SIZE] + GAP, STEP - 1
     for y in range(0, size, STEP):
         for x in range(0, size, STEP):
@@ -198,7 +198,7 @@ def _find_slopes(grid, depth, far, near, bounds):
 
 @inner(fastmath=FAST)
 def _mean_slope(bounds, cell, right, below):
-    """Mean ACROSS and DOWN of a cell and of its neighbours to the right and below, where these are known."""
+    """Mean ACROSS and DOWN of a cell and of its neighbours to the right and below, if these are known."""
     across, down, n, m = f4(0), f4(0), f4(0), f4(0)
     for k in range(4):
         own = U(cell + (k & 1) * right + (k >> 1) * below)
@@ -212,7 +212,7 @@ def _mean_slope(bounds, cell, right, below):
 
 @inner(fastmath=FAST)
 def _enclose(grid, depth, bounds):
-    """Fill all columns of the finest cells, given their slopes; returns the smallest q."""
+    """Fill all columns of the finest cells, given their slopes; return the smallest q."""
     size, side, stride = grid[SIZE], grid[CELLS], grid[SIZE] + GAP
     nearest, middle = f4(np.inf), f4(STEP - 0.5)
     for y in range(0, size, STEP):
@@ -236,7 +236,7 @@ def _enclose(grid, depth, bounds):
 
 @inner(fastmath=FAST)
 def _join(grid, bounds):
-    """Fill the coarser cells, each from four cells of the level before that lie side by side."""
+    """Fill the coarser cells, each from four adjacent cells of the previous level."""
     width, n, half, first = 2 * grid[CELLS], grid[CELLS] >> 1, f4(STEP), grid[BOUNDS_AT]
     at = first + 2 * n
     while n > 0:

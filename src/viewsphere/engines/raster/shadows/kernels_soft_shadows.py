@@ -1,12 +1,12 @@
-"""The share of a light that a sample sees where a view's map shows blockers: a blocker search, then a filter of that width.
+"""The share of a light that reaches a sample if a view's map shows blockers: a blocker search, then a filter of matching width.
 
 The method is percentage-closer soft shadows (Fernando 2005). A texel blocks only if it is between the sample and some part of
-the light, as in backprojection (Guennebaud et al. 2006). The filter is a window of the map's own texels, on a coarser level
-for a wider penumbra, so that nothing is random. A light has the shape and the size that it has as seen from the sample.
+the light, as in backprojection (Guennebaud et al. 2006). The filter is a window of the map's own texels, on a coarser level for
+a wider penumbra, so that nothing is random. The light has the shape and size that are visible from the sample.
 
 The edge that hides part of a lamp is often slanted. Seen from beneath a table's edge, the part of the table top near the lamp
-would hide far more than the edge does. So for lights at a place a plane is fitted to the blockers. On each side, the filter
-is as wide as the light seen past that plane.
+would hide far more than the edge does. So for lights at a place, a plane is fitted to the blockers. On each side, the filter is
+as wide as the light seen past that plane.
 """
 
 # ruff: isort: skip_file
@@ -35,18 +35,18 @@ from viewsphere.kernels.jit import inner
 
 f4 = nb.float32
 U = nb.uintp
-# Rows while a view is looked at. They reuse rows of irradiance and of probes, filled later, and of texture coordinates, read
+# Rows while a view is evaluated. They reuse rows of irradiance and of probes, filled later, and of texture coordinates, read
 # before.
 U_, V_, Q_, DU, DV, NEAR, SOFT, RADIUS, STATE, FACING = T1, T2, T3, T4, T5, T6, T7, IR, IG, IB
 LEFT, TOP, TEXEL, TALL, REACH = U0, V0, U1, V1, PROBES + BLOCK
 MEAN, SUM, COUNT = OPENX, OPENY, OPENZ
 # Between the search and the filter: how the blockers' distance grows per texel. The rows' other contents are not needed then.
 SLOPE_U, SLOPE_V = SUM, RADIUS
-NARROW, WIDE = 6.5, 9.0  # texels: half a filter of all texels, and from which on it skips some. Chosen by sight
+NARROW, WIDE = 6.5, 9.0  # texels: half widths of a filter that reads all texels, and above which it skips some. Chosen by sight
 
 
 def span(form: Rows, b: Rows) -> Lanes:
-    """Half the width of the light, seen from samples, across or down, in texels per q; an upper bound of it."""
+    """Upper bound of half the light's width as seen from samples, across or down, in texels per q."""
     u, v, middle = b[U_], b[V_], form.one(MIDDLE)
     return most(form.one(SPAN_U) + size(u - middle) * form.one(MORE), form.one(SPAN_V) + size(v - middle) * form.one(MORE))
 
@@ -66,21 +66,21 @@ class _Disc:
         self.farthest = where(b[STATE] > 1, math.inf, b[REACH] / self.half)
 
     def meet(self, z: Lanes, x: Lanes, y: Lanes) -> tuple[Lanes, Lanes, Lanes]:
-        """As `_Light.meet`, but with the squared distance of the place from the sample in its last number."""
+        """The result of `_Light.meet`, but with the squared distance of the place from the sample as its last number."""
         gap = most(self.q - z, 0)
         return (z < self.near + self.du * x + self.dv * y) & (gap <= self.farthest), gap, x * x + y * y
 
 
 class _Light:
-    """A light at a place, as samples see it: half its sizes along two axes, in texels per q, the matrix from texels to these
-    axes, and the factor by which its bounding box exceeds the half sizes.
+    """A light at a place, as seen from samples: half its sizes along two axes, in texels per q, the matrix from texels to these
+    axes, and the ratio of its bounding box to the half sizes.
     """
 
     def __init__(self, form: Rows, b: Rows) -> None:
         u, v = b[U_] - form.one(MIDDLE), b[V_] - form.one(MIDDLE)
         self.is_round = form.one(ROUND)
         is_round = self.is_round > 0
-        # A ball is seen as an ellipse, the longer the farther it is from the map's middle.
+        # A ball looks like an ellipse, which gets longer with the distance from the map's middle.
         tilt = form.one(TILT)
         longer = root(1 + (u * u + v * v) * tilt)
         less = tilt / (longer * (longer + 1))
@@ -96,7 +96,7 @@ class _Light:
         self.u_to_a, self.v_to_a = where(is_round, 1 - u * u * less, bv * per), where(is_round, -u * v * less, -bu * per)
         self.u_to_b, self.v_to_b = where(is_round, -u * v * less, -av * per), where(is_round, 1 - v * v * less, au * per)
         self.stretch = where(is_round, longer, most(size(au) + size(bu), size(av) + size(bv)))
-        # By how many texels more than one the light's border is softened along an axis that is foreshortened.
+        # Texels beyond one by which the light's border is softened along a foreshortened axis.
         self.thin_a = most(most(size(self.u_to_a), size(self.v_to_a)) - 1, 0) * 0.5
         self.thin_b = most(most(size(self.u_to_b), size(self.v_to_b)) - 1, 0) * 0.5
 
@@ -105,8 +105,10 @@ class _Light:
         self.farthest = where(b[STATE] > 1, math.inf, b[REACH] / most(self.half_a, self.half_b))
 
     def meet(self, z: Lanes, x: Lanes, y: Lanes) -> tuple[Lanes, Lanes, Lanes, Lanes]:
-        """For a texel of depth z (q) at (x, y) from the sample: whether it lies before the sample's plane, but not so far that
-        its penumbra is wider than REACH; its distance before the sample in q; its offsets along the light's axes.
+        """The values for a texel of depth z (q) at (x, y) from the sample.
+
+        They are: whether the texel is in front of the sample's plane, but not so far that its penumbra is wider than REACH; its
+        distance in front of the sample in q; and its offsets along the light's axes.
         """
         gap = most(self.q - z, 0)
         is_nearer = (z < self.near + self.du * x + self.dv * y) & (gap <= self.farthest)
@@ -124,9 +126,9 @@ def _over_window(*rows: int, sums: int = 2) -> Any:
     """Make a kernel function from a function of a view's form and a sample; it is called with `(depth, at, stride, form, b,
     i)`.
 
-    The decorated function returns two functions: one maps q and place (from the sample, in the map's texels) of texels to
-    `sums` numbers; the other maps the sums of these numbers over the window of sample i (uintp) to the values of `rows`. The
-    window begins at depth[at], its rows are `stride` apart (uintp).
+    The decorated function returns two functions. One maps q and place (from the sample, in the map's texels) of texels to
+    `sums` numbers. The other maps the sums of these numbers over the window of sample i (uintp) to the values of `rows`. The
+    window begins at depth[at], and its rows are `stride` apart (uintp).
     """
 
     def decorate(function: Callable[[Rows, Rows], tuple[Callable[..., tuple[Lanes, ...]], ...]]) -> Any:
@@ -194,10 +196,10 @@ def _block(form, b):
 
 @_over_window(COUNT, SUM)
 def _filter(form, b):
-    """SUM of the weights of texels in a filter as wide as a distant light is past blockers at MEAN; COUNT: of texels that let
-    light pass.
+    """SUM of the weights of texels in a filter as wide as a distant light past blockers at MEAN; COUNT of texels that let light
+    pass.
 
-    A blocker far behind others that are nearer to the light hides more than its own penumbra tells.
+    A blocker far behind others that are nearer to the light hides more than its own penumbra indicates.
     """
     disc, soft, step = _Disc(form, b), b[SOFT], b[TEXEL]
     radius, per = most(disc.half * b[MEAN], soft), 1 / step
@@ -216,8 +218,9 @@ def _filter(form, b):
 
 @_over_window(COUNT, MEAN, SLOPE_U, SLOPE_V, sums=10)
 def _block_aslant(form, b):
-    """COUNT of texels that hide part of the light, weighted less at its rim, and the plane that best fits their distances in q:
-    MEAN, the plane's distance at the sample's own texel, and its slopes, 0 where no plane fits.
+    """COUNT of texels that hide part of the light, weighted less at its rim, and the plane that best fits their distances in q.
+
+    MEAN is the plane's distance at the sample's own texel; the slopes are 0 if no plane fits.
     """
     light, step = _Light(form, b), b[TEXEL]
     soft, per = b[SOFT] + step, 1 / step
@@ -241,7 +244,7 @@ def _block_aslant(form, b):
         xx, yy = xx * per - x * x + least_wide, yy * per - y * y + least_wide
         scale = 1 / most(xx * yy - xy * xy, 1e-12)
         u, v = (gx * yy - gy * xy) * scale, (gy * xx - gx * xy) * scale
-        fit = clamp((u * gx + v * gy) / most(gg, 1e-12) * 5 - 3.5)  # 0 where less than 0.7 of the variance is explained
+        fit = clamp((u * gx + v * gy) / most(gg, 1e-12) * 5 - 3.5)  # 0 if less than 0.7 of the variance is explained
         change = (u * x + v * y) * fit
         fit = fit * where(change * 3 > g * 2, g * (2 / 3) / most(change, 1e-12), 1)
         return n, g - (u * x + v * y) * fit, u * fit, v * fit
@@ -251,7 +254,7 @@ def _block_aslant(form, b):
 
 @_over_window(COUNT, SUM)
 def _filter_aslant(form, b):
-    """As `_filter`, past a plane of blockers, and without the part of the light that lies below the sample's own plane."""
+    """The equivalent of `_filter` past a plane of blockers, and without the part of the light below the sample's own plane."""
     light, soft, step = _Light(form, b), b[SOFT], b[TEXEL]
     mean, slope_u, slope_v, per = b[MEAN], b[SLOPE_U], b[SLOPE_V], 1 / step
     soft_a, soft_b = light.thin_a + 0.5, light.thin_b + 0.5
@@ -267,7 +270,7 @@ def _filter_aslant(form, b):
         radius_a, radius_b = light.half_a * past * per, most(light.half_b * past, soft) * per
         disc = clamp((radius_a + soft_a + 0.5) * 0.5 - (a * a + b * b) * (0.5 * per * per) / radius_a)
         square = clamp(radius_a + soft_a - a * per) * clamp(radius_b + soft_b - b * per)
-        # Weight of a texel: the nearer the plane is to the sample there, the more of the light one texel stands for.
+        # Weight of a texel: the nearer the plane is to the sample there, the more of the light one texel represents.
         denser = least(first / past, 2)
         weight = (square + (disc - square) * light.is_round) * denser * denser * denser
         weight = where(is_above, weight, 0)
@@ -289,10 +292,10 @@ def _start(is_fine, b):
 
 @lanewise
 def _place_windows(radius, wide_from, margin, side, b):
-    """Place the window of texels within a radius: 8 x 8, beyond `wide_from` 16 x 16, or fewer rows. radius: its row."""
+    """Place the window of texels within a radius: 8 x 8, or 16 x 16 above `wide_from`, or fewer rows. radius: its row."""
     radius = b[radius]
     is_wide = radius > wide_from
-    step = power(radius / where(is_wide, NARROW, 2.25) * 1.999999)  # the least power that makes the window wide enough
+    step = power(radius / where(is_wide, NARROW, 2.25) * 1.999999)  # the smallest power that makes the window wide enough
     step = most(least(step, power(side / COARSEST)), 1)
     rows = least((radius / step + margin).whole().real() * 2 + 2, where(is_wide, 16, 8))
     wide, last = where(rows > 8, 16, 8), (side / step).whole().real()
@@ -305,7 +308,7 @@ def _place_windows(radius, wide_from, margin, side, b):
 
 @lanewise
 def _tell_blocked(form, b):
-    """MEAN distance of the blockers, and RADIUS of the penumbra that blockers at this distance make."""
+    """MEAN distance of the blockers, and RADIUS of the penumbra of blockers at this distance."""
     mean = b[SUM] / most(b[COUNT], 1)
     b[MEAN], b[SUM] = mean, 0
     b[RADIUS] = most(_Disc(form, b).half * mean, b[SOFT])
@@ -313,17 +316,17 @@ def _tell_blocked(form, b):
 
 @lanewise
 def _tell_width(form, row, b):
-    """Put into `row` the radius of the penumbra that blockers at MEAN make."""
+    """Store the radius of the penumbra of blockers at MEAN in `row`."""
     light = _Light(form, b)
     b[row] = most(most(light.half_a, light.half_b) * b[MEAN], b[SOFT]) * light.stretch
 
 
 @lanewise
 def _tell_filtered(form, b):
-    """STATE: the least share of light found so far; REACH: halved for the next search, 0 where it was narrow."""
+    """STATE: the minimum share of light so far; REACH: halved for the next search, 0 if the filter was narrow."""
     whole, reach = b[SUM], b[REACH]
     hidden = where(whole > 0, 1 - b[COUNT] / most(whole, 1e-6), 0)
-    # Narrow filters are the likeliest to take lit places before a wall for this one; wide penumbrae are darkened but little.
+    # Narrow filters most often confuse lit places in front of a wall with this one; wide penumbrae are darkened only slightly.
     darker = 1 + (form.one(DARKER) - 1) * most(clamp(3 - b[RADIUS] / b[SOFT]), 0.15)
     b[STATE] = least(b[STATE], most(1 - hidden * darker, 0))
     b[REACH] = where(reach > WIDE, reach * 0.5, 0)
@@ -341,7 +344,7 @@ def _begin(grid, i, b):
 
 @inner(fastmath=FAST)
 def search(count, form, grid, depth, b):
-    """STATE of samples on a view's map that may be in a penumbra: the share of the light that they see.
+    """STATE of samples on a view's map that may be in a penumbra: the share of the light that reaches them.
 
     form, grid: a view's rows of `Views`. RADIUS: the distance in texels within which there may be blockers.
     """

@@ -1,6 +1,7 @@
-"""Ambient occlusion: how much of the sky each place on and beside the targets can see, baked once a model.
+"""Ambient occlusion: the share of the sky visible from each place on and beside the targets, baked once per model.
 
-Depths from 32 or 48 directions all over the sphere, each looked up as softly as a light that fills its part of the sphere.
+It uses depth maps from 32 or 48 directions distributed over the sphere, each looked up as softly as a light that fills its part
+of the sphere.
 """
 
 from __future__ import annotations
@@ -28,29 +29,29 @@ Float = NDArray[np.float64]
 Quality = Literal["off", "fast", "fine"]
 
 _LONGEST = {"fast": 40, "fine": 64}  # cells along the longest side
-_AXES = {"fast": 16, "fine": 24}  # lines along which depths are drawn, both ways
+_AXES = {"fast": 16, "fine": 24}  # lines along which depths are drawn, in both directions
 _MAP = {"fast": 96, "fine": 128}
 _MOST_CELLS = {"fast": 60_000, "fine": 260_000}
-_MOST_OPEN_CELLS = 60_000  # where scenery may read any of them
+_MOST_OPEN_CELLS = 60_000  # if scenery may read any of them
 _PAD, _WIDE_PAD = 3, 6  # cells around the targets, without and with scenery
-_PUSH = 1.6  # cells between a surface and where it reads the volume
+_PUSH = 1.6  # cells between a surface and the place where it reads the volume
 _FLOOR = 128  # cells of the ground's map, each way
 _SIDES = 1 << 16  # triangles measured at once: all 2 million of a crowd at once take 200 MB
 _MOST_MARKED = 200_000  # points of surfaces at a time
 _MOST_MARKS = 50_000_000  # points of all surfaces; for more of them, all points of the volume are computed instead
-_DEEPEST = 0.92  # the rest is light that objects and ground throw back and forth
+_DEEPEST = 0.92  # the rest is light reflected between objects and ground
 
 
 class Occlusion(NamedTuple):
     """N volumes and maps, one of each for all targets of a still picture, or for each target of a sequence.
 
-    volume (cells, 8) float32, see `kernels_occlusion`, of all volumes one after another; grid (N, 4) int64: where each begins,
-    its layers, rows and columns; frame (N, 8): x, y, z of its first point, cells per length, how far from a surface it is read
-    in cells, whether there is a volume, whether there is a ground; floor (N, n, n, 2): share of the sky's and of all light that
-    the targets leave to what they stand on; floor_frame (N, 7): its cells per length, its corner's x and y, the z they stand
-    on, their height, whether they stand on anything, whether they do not darken what is high above. All of these are in the
-    axes of baking; pose (N, 12): rows of the (3, 4) matrix from the stage to these axes, which is rigid; reach (N, 6): lowest
-    and highest x, lowest and highest y and z in the stage where anything can be hidden.
+    volume (cells, 8) float32, see `kernels_occlusion`, all volumes one after another; grid (N, 4) int64: the start of each, its
+    layers, rows and columns; frame (N, 8): x, y, z of its first point, cells per length, distance from a surface at which it is
+    read in cells, whether there is a volume, whether there is a ground; floor (N, n, n, 2): the shares of the sky's light and
+    of all light that the targets leave to the surface below them; floor_frame (N, 7): its cells per length, its corner's x and
+    y, the z of that surface, the targets' height, whether there is such a surface, whether the targets do not darken places
+    high above. All of these are in the axes of baking. pose (N, 12): rows of the (3, 4) matrix from the stage to these axes,
+    which is rigid; reach (N, 6): lowest and highest x, lowest and highest y and z in the stage at which anything can be hidden.
     """
 
     volume: Float32
@@ -72,11 +73,11 @@ NO_OCCLUSION = Occlusion(
     np.zeros((0, 6), np.float32),
 )
 IN_PLACE = np.eye(4)
-"""World from the axes of baking, in the stage's unit, of what is baked where it stands."""
+"""World from the axes of baking, in the stage's unit, for things that are baked in place."""
 
 
 class Hidden(NamedTuple):
-    """The occlusion by some targets, in the axes of baking: `Occlusion` of one volume and map, without pose and reach.
+    """The occlusion by some targets, in the axes of baking: an `Occlusion` of one volume and map, without pose and reach.
 
     volume (layers, rows, columns, 8); floor (n, n): the sky's share alone.
     """
@@ -88,8 +89,8 @@ class Hidden(NamedTuple):
 
 
 class Fineness(NamedTuple):
-    """quality: how many directions and cells; most: cells of a volume at most; floor: cells of the ground's map, each way;
-    is_open: whether anything else may be near, which reads any of the cells.
+    """quality: the numbers of directions and cells; most: maximum number of cells of a volume; floor: cells of the ground's map
+    in each direction; is_open: whether other things may be near, which may read any of the cells.
     """
 
     quality: Literal["fast", "fine"]
@@ -108,10 +109,10 @@ class _Baking:
 
 
 def bake_occlusion(casters: Casters, has_ground: bool, quality: Quality, is_alone: bool = False) -> Occlusion:
-    """Return the occlusion that depends on the targets alone; `with_ground_light` adds the light of lamps and sky to the floor.
+    """Return the occlusion that depends only on the targets; `with_ground_light` adds the light of lamps and sky to the floor.
 
-    The last result is kept for the same `casters.targets`. is_alone: there is one target. The cache keeps its result as well,
-    since other runs have the same; places of several targets are drawn anew.
+    The last result is cached for the same `casters.targets`. is_alone: there is one target. Its result is also stored in the
+    cache, since other runs have the same target; places of several targets are drawn anew.
     """
     if quality == "off" or not casters.extent.triangles or not (casters.extent.high - casters.extent.low).max() > 0:
         return NO_OCCLUSION
@@ -128,12 +129,12 @@ def _bake(baking: _Baking) -> Occlusion:
 
 
 def _hidden(baking: _Baking) -> Hidden:
-    """`hidden_by`, from the cache where it holds that of an equal target."""
+    """The result of `hidden_by`, from the cache if it has the result for an equal target."""
     casters, extent = baking.casters, baking.casters.extent
     triangles = casters.surfaces.triangles[: extent.triangles]
     opaque_from = casters.surfaces.looks[casters.surfaces.material[: extent.triangles], L_CASTS_FROM]
     if not baking.is_alone or casters.scenery is not None or ((opaque_from > 0) & (opaque_from <= 1)).any():
-        return hidden_by(casters, baking.has_ground, baking.fineness)  # textures decide what is opaque
+        return hidden_by(casters, baking.has_ground, baking.fineness)  # textures determine which parts are opaque
     vertices = casters.surfaces.vertices[: int(triangles.max()) + 1]
     box = extent.low, extent.high, extent.ground_z
     content = "occlusion", vertices[:, :3], vertices[:, 11:14], triangles, opaque_from, *box, baking.has_ground, baking.fineness
@@ -141,7 +142,7 @@ def _hidden(baking: _Baking) -> Hidden:
 
 
 def hidden_by(casters: Casters, has_ground: bool, fineness: Fineness) -> Hidden:
-    """Return the occlusion by the targets, of the places near them and of the ground."""
+    """Return the occlusion of the places near the targets, and of the ground, by the targets."""
     directions, views = _sky_views(casters, fineness.quality)
     volume, corner, cells = _volume(casters, directions, views, fineness)
     floor, floor_frame = np.ones((fineness.floor, fineness.floor), np.float32), np.zeros(7, np.float32)
@@ -154,8 +155,8 @@ def hidden_by(casters: Casters, has_ground: bool, fineness: Fineness) -> Hidden:
 def joined(hidden: Sequence[Hidden], poses: Sequence[Float], reach: Float, volume: Float32 | None = None) -> Occlusion:
     """Join the occlusion of several targets, each at its place.
 
-    `poses` (4, 4) are rigid, from the axes of baking to the stage, and `reach` (N, 6) is that of `Occlusion`. volume: the
-    result of `joined_volumes` for them, if you have it.
+    `poses` (4, 4) are rigid, from the axes of baking to the stage, and `reach` (N, 6) is as in `Occlusion`. volume: the result
+    of `joined_volumes` for them, if already computed.
     """
     volumes = {id(each.volume): each.volume for each in hidden}
     firsts = dict(zip(volumes, np.cumsum([0, *(v[..., 0].size for v in volumes.values())]).tolist(), strict=False))
@@ -172,14 +173,14 @@ def joined(hidden: Sequence[Hidden], poses: Sequence[Float], reach: Float, volum
 
 
 def joined_volumes(volumes: Sequence[Float32]) -> Float32:
-    """Different ones, one after another, (cells, 8)."""
+    """The distinct volumes, one after another, (cells, 8)."""
     flat = [volume.reshape(-1, kernels.COEFFICIENTS) for volume in volumes]
     return flat[0] if len(flat) == 1 else np.concatenate(flat)
 
 
 def with_ground_light(occlusion: Occlusion, lights: Lights, ambient: float) -> Occlusion:
-    """The same where these lights and the sky light the ground: `ambient` is the sum over red, green and blue of the irradiance
-    that the open ground has from the sky.
+    """The occlusion with the ground lit by these lights and the sky. `ambient` is the sum over red, green and blue of the sky's
+    irradiance on the open ground.
     """
     if not occlusion.floor_frame[:, 5].any():
         return occlusion
@@ -189,7 +190,9 @@ def with_ground_light(occlusion: Occlusion, lights: Lights, ambient: float) -> O
 
 
 def of_ground_alone(occlusion: Occlusion) -> Occlusion:
-    """The same where the targets' own light is known (`bounces`): only the ground is darkened, by all that the targets hide."""
+    """The occlusion for targets whose own light is known (`bounces`): only the ground is darkened, by everything that the
+    targets hide.
+    """
     frame, floor = occlusion.frame.copy(), occlusion.floor.copy()
     frame[:, 5] = 0
     floor[..., 0] = np.clip(1 - (1 - floor[..., 0]) / _DEEPEST, 0, 1)
@@ -204,7 +207,7 @@ def _all_light(occlusion: Occlusion, lights: Lights, ambient: float) -> Float:
     pose = occlusion.pose.reshape(-1, 3, 4).astype(np.float64)
     arrived, whole = ambient * sky, np.full(sky.shape, ambient)
     for which, kind in enumerate(lights.kind.tolist()):
-        # What lamps give the ground around has their shadows taken off already; what lies on it keeps their light in.
+        # The lamps' light on the ground around already has its shadows; things on the ground keep their light in.
         is_lamp = kind != DISTANT
         depth = 0.02 * height * (occlusion.frame[:, 6, None, None] != 0) if is_lamp else 0.0  # scenery may be the ground
         places = np.stack(np.broadcast_arrays(left + at, (front + at).transpose(0, 2, 1), z - depth), axis=1)
@@ -219,9 +222,10 @@ def _all_light(occlusion: Occlusion, lights: Lights, ambient: float) -> Float:
 
 
 def sky_directions(axes: int) -> Float32:
-    """Unit vectors that share the sphere evenly, (2 * axes, 3): a Fibonacci spiral up from the horizon, then its opposites.
+    """Unit vectors distributed evenly over the sphere, (2 * axes, 3): a Fibonacci spiral up from the horizon, then its
+    opposites.
 
-    Their second moments are those of the sphere, so that a surface of any tilt sees half of them with the right mean.
+    Their second moments are those of the sphere, so a surface of any tilt faces half of them, with the right mean.
     """
     i = np.arange(axes)
     z = (i + 0.5) / axes
@@ -236,7 +240,7 @@ def sky_directions(axes: int) -> Float32:
 
 
 def _sky_views(casters: Casters, quality: Literal["fast", "fine"]) -> tuple[Float32, Views]:
-    """Depths of the targets seen from all directions, the second half of which are opposite to the first."""
+    """Depths of the targets from all directions, the second half of which are opposite to the first."""
     directions = sky_directions(_AXES[quality])
     low, high = casters.extent.low, casters.extent.high
     span = 1.15 * float(np.linalg.norm(high - low))
@@ -251,7 +255,7 @@ def _sky_views(casters: Casters, quality: Literal["fast", "fine"]) -> tuple[Floa
 
 
 def _volume(casters: Casters, directions: Float32, views: Views, fineness: Fineness) -> tuple[Float32, Float, float]:
-    """The volume, where its first point lies and how many cells there are per length."""
+    """The volume, the place of its first point, and the number of cells per length."""
     low, size = casters.extent.low, casters.extent.high - casters.extent.low
     pad = _WIDE_PAD if fineness.is_open else _PAD
     cells = _LONGEST[fineness.quality] / float(size.max())
@@ -272,7 +276,7 @@ def _volume(casters: Casters, directions: Float32, views: Views, fineness: Finen
 
 
 def _seen(points: Float, views: Views, directions: Float32) -> Float32:
-    """Return the part of these directions that each point (N, 3) sees, as coefficients (N, 8)."""
+    """Return the part of these directions that is visible from each point (N, 3), as coefficients (N, 8)."""
     seen = np.zeros((len(points), kernels.COEFFICIENTS), np.float32)
     room = np.zeros(ROWS * BLOCK, np.float32)
     kernels.see(np.ascontiguousarray(points, np.float32), views, directions, room, seen)
@@ -280,7 +284,7 @@ def _seen(points: Float, views: Views, directions: Float32) -> Float32:
 
 
 def _spread(volume: Float32, known: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Give unknown points beside known ones their mean, once; returns what is known then."""
+    """Give unknown points beside known ones the mean of these, once; return a mask of the points that are then known."""
     own = np.concatenate([volume, np.ones((*known.shape, 1), np.float32)], axis=-1)
     own[~known] = 0
     total = np.zeros_like(own)
@@ -302,11 +306,11 @@ def _longest(points: Float32, triangles: NDArray[np.uint32]) -> Float32:
 def _read_points(casters: Casters, corner: Float, cells: float, shape: NDArray[np.int_]) -> NDArray[np.bool_]:
     """The points of the volume that samples of the targets will read, on both sides of their surfaces.
 
-    corner (3,): where the first point lies; cells: per length.
+    corner (3,): the place of the first point; cells: per length.
     """
     triangles = casters.surfaces.triangles[: casters.extent.triangles].T
     vertices = casters.surfaces.vertices.T
-    # Where and which way: lengths in cells.
+    # Place and direction: lengths in cells.
     known = np.concatenate([(vertices[11:14] - corner[:, None]) * cells, vertices[:3]], dtype=np.float32)
     blocks = (triangles[:, start : start + _SIDES] for start in range(0, triangles.shape[1], _SIDES))
     parts = np.concatenate([np.maximum(np.ceil(1.5 * _longest(known[:3], block)), 1) for block in blocks])
@@ -333,7 +337,8 @@ def _read_points(casters: Casters, corner: Float, cells: float, shape: NDArray[n
 
 
 def _mark(known: Float32, is_first: NDArray[np.bool_]) -> None:
-    """Mark the first of the eight points around where surface points (6, N) of this place and normal read the volume."""
+    """Mark the first of the eight points around each place at which surface points (6, N), place and normal, read the volume.
+    """
     place, normal = known[:3], known[3:]
     off = normal * (_PUSH / np.maximum(np.sqrt((normal * normal).sum(axis=0)), 1e-6))
     layers, rows, columns = is_first.shape
@@ -345,7 +350,8 @@ def _mark(known: Float32, is_first: NDArray[np.bool_]) -> None:
 
 
 def _floor(casters: Casters, z: float, directions: Float32, views: Views, size: int) -> tuple[Float32, Float32]:
-    """Share of the sky's light that the targets leave to what they stand on, (size, size), and where it lies."""
+    """The share of the sky's light that the targets leave to the surface below them, (size, size), and the place of this map.
+    """
     low, high = casters.extent.low, casters.extent.high
     height = float(high[2]) - z
     half = float(max((high - low)[:2].max() / 2, 1e-3) + 0.9 * height)
@@ -362,6 +368,6 @@ def _floor(casters: Casters, z: float, directions: Float32, views: Views, size: 
 
 
 def _window(size: int) -> Float:
-    """1 within the ground's map, falling to 0 at its border."""
+    """A window that is 1 within the ground's map and falls to 0 at its border."""
     inward = np.minimum(np.arange(size) + 0.5, size - np.arange(size) - 0.5) / (0.15 * size)
     return np.clip(np.minimum(inward[:, None], inward), 0, 1)

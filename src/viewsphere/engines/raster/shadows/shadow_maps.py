@@ -1,4 +1,4 @@
-"""The lights of a scene that cast shadows, baked once a stage: the light of each, and the surfaces nearest to it."""
+"""The lights of a scene that cast shadows, baked once per stage: the light of each, and the surfaces nearest to it."""
 
 from __future__ import annotations
 
@@ -30,18 +30,18 @@ _WIDER = 8.0  # width of each wide map of a distant light, in widths of the one 
 _MOST_WIDE = 3  # wide maps: 2 and 4 give the same pictures, and a fourth map would cover 4,096 widths of the targets
 _FACE = 1.15  # half width of a cube's face at distance 1, so that filters have room around _READ: 0.03 % at night (1.05, 1.4)
 _READ = 1.03  # half width of the part of a face that is read
-_WIDEST = 2.5  # tangent from which one perspective is too coarse: 0.01 % at night (1.5, 4)
-_SHARPEST = 1.2  # least half width of a filter, texels: narrower ones show steps, twice the width changes 0.3 %
+_WIDEST = 2.5  # tangent above which one perspective is too coarse: 0.01 % at night (1.5, 4)
+_SHARPEST = 1.2  # minimum half width of a filter, texels: narrower ones show steps, twice the width changes 0.3 %
 # Lamps that are shut in, in shades and bulbs. Chosen by sight; none of the measured pictures changes.
 _TIGHT = 6.0, 8.0  # half the width of such a lamp's filter, and the factor for what the filter hides
-_BULB = 0.75  # share of a lamp's view, closer than its own size, from which on that surface is the lamp itself
-_MANY = 4  # fitted maps from which on all are half as wide, which bounds their memory: same pictures at 2 and 16
+_BULB = 0.75  # share of a lamp's view, closer than its own size, above which that surface counts as the lamp itself
+_MANY = 4  # number of fitted maps above which all are half as wide, which bounds their memory: same pictures at 2 and 16
 
 
 @dataclass(frozen=True, eq=False)
 class Extent:
-    """The targets' bounds, low and high (3,), and the z they stand on or None, in the units of `Surfaces`; how many triangles
-    they have, which come first; half the size of all there is.
+    """The targets' bounds, low and high (3,), and the z of the surface below them or None, in the units of `Surfaces`; the
+    number of their triangles, which come first; half the size of everything.
     """
 
     low: Float
@@ -55,7 +55,7 @@ class Views(NamedTuple):
     """The views from the lights.
 
     form (V, FORM) float32 and grid (V, GRID) int64: columns named in `kernels_shadow`; depth (N,) float32: all levels of all
-    maps, row by row; bounds (M, 4) float32: planes before and behind the surfaces in the maps' cells.
+    maps, row by row; bounds (M, 4) float32: planes in front of and behind the surfaces in the maps' cells.
     """
 
     form: Float32
@@ -66,9 +66,9 @@ class Views(NamedTuple):
 
 class Lights(NamedTuple):
     """K lights. kind (K,) int32; place (K, 3): position, or the direction to a distant light; color (K, 3): irradiance facing
-    it, at distance 1 from a light at a place; axis (K, 3): where a spot or a rectangle looks; right, up (K, 3): half a
-    rectangle's sides; cone (K, 2): cosine at a spot's rim, inverse width of its ramp; radius (K,): half a distant light's
-    angle in radians, else its size; first (K + 1,) int32: its views.
+    it, at distance 1 from a light at a place; axis (K, 3): the direction of a spot or a rectangle; right, up (K, 3): half a
+    rectangle's sides; cone (K, 2): cosine at a spot's rim, inverse width of its ramp; radius (K,): half a distant light's angle
+    in radians, otherwise the light's size; first (K + 1,) int32: the range of its views.
     """
 
     kind: Int32
@@ -85,10 +85,11 @@ class Lights(NamedTuple):
 
 @dataclass(frozen=True)
 class ShadowView:
-    """One map to draw: the (4, 4) matrix from the world, from which w on (from which distance on, if round), texels per length
-    (at distance 1), the least distance from the border at which it is read, and half the light's sides (2, 3) along the view's
-    axes (per length), or the radius and zeros if it is round, as every distant light is; whether wide penumbrae are filtered
-    finely.
+    """One map to draw: the (4, 4) matrix from the world, the minimum w (or, if round, the minimum distance), texels per length
+    (at distance 1), and the minimum distance from the border at which it is read.
+
+    Also half the light's sides (2, 3) along the view's axes (per length), or the radius and zeros if it is round, as every
+    distant light is; and whether wide penumbrae are filtered finely.
     """
 
     matrix: Float
@@ -119,7 +120,7 @@ class Casters:
     corners: Float | None = None
 
     def alone(self, surfaces: Surfaces, maps: StillMaps | None = None) -> Casters:
-        """The same, but only these cast shadows; `maps` are those of them that stand still in a sequence."""
+        """The casters restricted to these surfaces; `maps` are the maps of those that stand still in a sequence."""
         return replace(self, surfaces=surfaces, maps=maps)
 
 
@@ -145,7 +146,7 @@ def bake_lights(
     """Bake the data that depends on the lights and on the shadow casters, but not on the camera.
 
     `resolution` is the width of the maps around the targets, `unit` the stage's unit in metres. Dark lights, and lights that
-    the ground hides altogether, are left out; hemisphere lights too, see `even_light`.
+    the ground hides completely, are left out. So are hemisphere lights, see `even_light`.
     """
     middle = (casters.extent.low + casters.extent.high) / 2
     sources = [_from_afar(d) for d in distant]
@@ -192,7 +193,7 @@ def _is_buried(source: _Source, floor: float | None) -> bool:
 
 
 def _level_axes(axis: Float) -> tuple[Float, Float]:
-    """A level direction to the right of this one, and what is up for it."""
+    """A horizontal direction to the right of this one, and the matching up direction."""
     right = np.array([axis[1], -axis[0], 0.0])
     length = float(np.linalg.norm(right))
     right = right / length if length > 1e-6 else np.array([1.0, 0.0, 0.0])
@@ -200,7 +201,7 @@ def _level_axes(axis: Float) -> tuple[Float, Float]:
 
 
 def _casting_points(casters: Casters) -> Float:
-    """Vertices of the targets' triangles that cast shadows, (n, 3); in a sequence boxes around them will do."""
+    """Vertices of the targets' triangles that cast shadows, (n, 3); in a sequence, the corners of their boxes."""
     if casters.corners is not None:
         return casters.corners
     surfaces, stop = casters.surfaces, casters.extent.triangles
@@ -211,7 +212,9 @@ def _casting_points(casters: Casters) -> Float:
 
 
 def _views(source: _Source, points: Float, casters: Casters, size: int) -> Views:
-    """The narrowest first: a sample is looked up in the first that it is on; on none there is no shadow."""
+    """The views of a light, the narrowest first. A sample uses the first one that contains it; outside all of them, there is no
+    shadow.
+    """
     has_scenery = casters.scenery is not None
     if source.kind == DISTANT:
         narrow = draw_views([_fitted_from_afar(source, points, casters, size)] if len(points) else [], casters)
@@ -225,14 +228,14 @@ def _views(source: _Source, points: Float, casters: Casters, size: int) -> Views
         views = [replace(view, near=source.radius) for view in views]
         drawn = draw_views(views, casters)
     if fitted is None and not has_scenery and _is_shut_in(views, drawn, casters.extent.ground_z is not None):
-        # Beyond a wall the filter would find the lit floor before it.
+        # Beyond a wall, the filter would find the lit floor in front of it.
         drawn.form[:, (kernels.SHARPEST, kernels.DARKER)] = _TIGHT
     return drawn
 
 
 def _is_in_bulb(views: Sequence[ShadowView], drawn: Views, radius: float) -> bool:
-    """Return whether most of what is seen in these views lies within the ball that shines: a bulb, which would hide all of
-    its light. A table top that cuts through the ball hides half of it at most.
+    """Return whether most of the surfaces in these views are inside the emitting ball: a bulb, which would hide all of its
+    light. A table top that cuts through the ball hides at most half of it.
     """
     within, count = 0, 0
     for i, view in enumerate(views):
@@ -243,7 +246,7 @@ def _is_in_bulb(views: Sequence[ShadowView], drawn: Views, radius: float) -> boo
 
 
 def _is_shut_in(views: Sequence[ShadowView], drawn: Views, has_ground: bool) -> bool:
-    """Return whether all that is seen in these views ends at a target, or on the ground."""
+    """Return whether all rays of these views end at a target, or on the ground."""
     for i, view in enumerate(views):
         right, up, ahead = view.matrix[0, 2] / view.texels, view.matrix[1, 2] / view.texels, view.matrix[3, 2]
         place = (np.arange(view.size) + 0.5 - view.size / 2) / view.texels
@@ -255,7 +258,7 @@ def _is_shut_in(views: Sequence[ShadowView], drawn: Views, has_ground: bool) -> 
 
 @dataclass(frozen=True)
 class _Backdrop:
-    """Scenery under a distant light: `key` says which, how wide the narrowest map's `span` is, how far the scenery reaches."""
+    """Scenery under a distant light: the scenery's `key`, the `span` of the narrowest map, and the extent of the scenery."""
 
     key: Hashable
     direction: tuple[float, float, float]
@@ -278,9 +281,9 @@ def _backdrop(source: _Source, casters: Casters, size: int) -> _Backdrop:
 
 @lru_cache(maxsize=2)
 def _wide_from_afar(backdrop: _Backdrop) -> Views:
-    """Views of the scenery alone around the origin; the widest ends where the scenery does.
+    """Views of the scenery alone around the origin; the widest one covers the whole scenery.
 
-    The last ones are kept: they do not change with the targets.
+    The latest views are cached, because they do not change with the targets.
     """
     away = -np.array(backdrop.direction)
     span, widest = backdrop.span, 2 * backdrop.reach
@@ -310,7 +313,7 @@ def _ball(radius: float) -> Float:
 
 
 def _fitted_from_afar(source: _Source, points: Float, casters: Casters, size: int) -> ShadowView:
-    """Around the targets and the penumbrae behind them."""
+    """The view of a distant light around the targets and the penumbrae behind them."""
     away = -source.place
     axes = np.stack([*_level_axes(away), away])
     seen = points @ axes.T
@@ -325,7 +328,7 @@ def _fitted_from_afar(source: _Source, points: Float, casters: Casters, size: in
     middle = (low + high) / 2
     if casters.maps is not None:
         span, middle[:2] = snapped(span, middle[:2])
-        middle[2] = 0.0  # any will do, but the same gives the same matrix
+        middle[2] = 0.0  # any axis works, but the same axis gives the same matrix
     return parallel_view(away, axes.T @ middle, span, tangent, size)
 
 
@@ -343,7 +346,7 @@ def _perspective(source: _Source, axes: Float, tangent: float, size: int, guard:
 
 
 def _fitted_from_place(source: _Source, points: Float, casters: Casters, size: int) -> ShadowView | None:
-    """One perspective of the targets, if they lie well within one: along a rectangle's own axis if that will do."""
+    """One perspective view of the targets, if they fit in one; it is along a rectangle's own axis if possible."""
     away = (casters.extent.low + casters.extent.high) / 2 - source.place
     distance = float(np.linalg.norm(away))
     if distance < 1e-6:
@@ -369,7 +372,7 @@ def _fitted_from_place(source: _Source, points: Float, casters: Casters, size: i
 
 
 def _all_round(source: _Source, size: int) -> list[ShadowView]:
-    """Everything the light may shine at: its cone, or the faces of a cube."""
+    """Views of everything that the light may reach: its cone, or the faces of a cube."""
     axis = source.axis if source.kind != POINT else np.array([0.0, 0.0, -1.0])
     right, up = _level_axes(axis)
     if source.kind == AREA and source.radius > 0:
@@ -411,7 +414,7 @@ def draw_views(views: Sequence[ShadowView], casters: Casters, opposite: bool = F
 def _draw(
     view: ShadowView, tilt: float, surfaces: Surfaces, textures: Textures, nearest: Float32, farthest: Float32 | None = None
 ) -> None:
-    """Draw these surfaces over a map of a view, and over that of the farthest, if asked."""
+    """Draw these surfaces over a map of a view, and over the map of the farthest surfaces, if given."""
     if not len(surfaces.triangles):
         return
     first, stop = int(surfaces.triangles.min()), int(surfaces.triangles.max()) + 1
@@ -422,7 +425,7 @@ def _draw(
 
 
 def _begin(view: ShadowView, tilt: float, casters: Casters, nearest: Float32) -> tuple[Part, ...]:
-    """Draw what stands still in a sequence into an empty map; returns what is still to be drawn."""
+    """Draw the still things of a sequence into an empty map; return the parts that are still to be drawn."""
     maps, key = casters.maps, (view.matrix.tobytes(), view.near, tilt, view.size)
     kept = None if maps is None else maps.begun(key)
     nearest[:] = np.inf if kept is None else kept
@@ -454,7 +457,7 @@ def _joined(parts: Sequence[Views]) -> Views:
 
 
 def _thin_out(views: Views, which: int) -> None:
-    """Fill the coarser levels of a drawn map: each has every second texel of the one before in both directions."""
+    """Fill the coarser levels of a drawn map: each has every second texel of the previous one in both directions."""
     size = int(views.grid[which, kernels.SIZE])
     finest = _level(views, which, size)[:, :size]
     for level in range(1, kernels.LEVELS):
@@ -470,7 +473,7 @@ def _level(views: Views, which: int, size: int, level: int = 0) -> Float32:
 
 
 def _lay_out(row: NDArray[np.int64], size: int, texels: int, cells: int) -> tuple[int, int]:
-    """Fill a view's row of `Views.grid`; returns where the next one begins."""
+    """Fill a view's row of `Views.grid`; return the start of the next one."""
     side = 1 << (size // kernels.STEP - 1).bit_length()
     row[kernels.SIZE], row[kernels.BOUNDS_AT], row[kernels.CELLS] = size, cells, side
     for level in range(kernels.LEVELS):

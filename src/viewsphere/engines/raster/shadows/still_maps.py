@@ -1,4 +1,4 @@
-"""Shadow maps of a sequence: what stands still is drawn once, and what moves over it at each instant."""
+"""Shadow maps of a sequence: still things are drawn once, and moving things are drawn over them at each instant."""
 
 from __future__ import annotations
 
@@ -13,16 +13,16 @@ from numpy.typing import NDArray
 from viewsphere.engines.raster.records import Float32, Surfaces
 
 MOST = 8
-"""Maps of what stands still that are kept: 4 MB each with 1,024 texels a side."""
+"""Number of maps of still things that are cached: 4 MB each with 1,024 texels a side."""
 
 STEPS = 16
-"""Places a map's width at which it may lie: maps that follow what moves stay where they are for a while, and so do the edges
-of shadows.
+"""Number of possible positions per map width. So maps that follow moving things keep their place for a while, and the edges of
+shadows do, too.
 """
 
 Part = Callable[[], Surfaces]
 Key = tuple[bytes, float, float, int]
-"""Of a view: its matrix, where it begins, its tilt and its size."""
+"""The key of a view: its matrix, its near limit, its tilt and its size."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,8 +40,8 @@ class StillMaps:
 
     @classmethod
     def of(cls, part: Callable[[int], Surfaces], count: int, moving: Sequence[int], targets: int) -> StillMaps:
-        """Of so many things and the ground, whose surfaces `part` gives, of which these are `moving`; those behind the first
-        `targets` are scenery.
+        """The maps for `count` things and the ground, whose surfaces `part` gives, with the indices of the `moving` things;
+        things after the first `targets` are scenery.
         """
         moves = set(moving)
 
@@ -51,18 +51,18 @@ class StillMaps:
         return cls(parts(0, False), parts(0, True), cls(parts(targets, False), parts(targets, True)))
 
     def begun(self, key: Key) -> Float32 | None:
-        """The map of what stands still in this view, if it is kept."""
+        """The map of still things in this view, if it is cached."""
         return self._maps.get(key)
 
     def keep(self, key: Key, depth: Float32) -> None:
-        """Keep the map of what stands still in this view."""
+        """Cache the map of still things in this view."""
         if len(self._maps) == MOST:
             del self._maps[next(iter(self._maps))]
         self._maps[key] = depth.copy()
 
 
 def snapped(span: float, middle: NDArray[np.float64]) -> tuple[float, NDArray[np.float64]]:
-    """A width and a middle (2,), of which there are few, for a map that holds what this one does."""
+    """A width and a middle (2,), from a small set, for a map that contains this one."""
     wide = rounded(span * STEPS / (STEPS - 1))
     step = wide / STEPS
     return wide, np.rint(middle / step) * step

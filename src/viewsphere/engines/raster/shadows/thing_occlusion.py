@@ -1,7 +1,7 @@
-"""Ambient occlusion of a sequence: baked once for each target, wherever and however often it stands, and moved along with it.
+"""Ambient occlusion of a sequence: baked once for each target, for all of its places and copies, and moved along with it.
 
-What is baked of a target depends on its mesh and on which of its sides is up, roughly, but on no instant and no other target:
-so however a sequence is cut into shots, its pictures are the same.
+The baked data of a target depends on its mesh and, roughly, on which of its sides is up, but not on an instant or another
+target. So the pictures are the same however a sequence is cut into shots.
 """
 
 from __future__ import annotations
@@ -35,23 +35,25 @@ from viewsphere.model.thing import Repaint
 Float = NDArray[np.float64]
 
 MOST = 64
-"""Targets, each in some tilt, that are kept: 2 MB each."""
+"""Number of targets, each in some tilt, that are cached: 2 MB each."""
 
 MOST_CELLS, ALL_CELLS = 60_000, 2_000_000
-"""Of a target's volume, and of those of all targets."""
+"""Maximum number of cells of a target's volume, and of the volumes of all targets."""
 
 MAPS, ALL_TEXELS = (128, 96, 64, 48), 65_536
-"""Cells of a target's map of the ground, each way; and of those of all targets, unless even the smallest have more."""
+"""Cells of a target's map of the ground in each direction; and the maximum for all targets, unless even the smallest maps
+exceed it.
+"""
 
 TILTS = 4
-"""Steps in which what is up for a target is rounded, from level to vertical."""
+"""Steps to which a target's up direction is rounded, from level to vertical."""
 
 Key = tuple[Mesh, tuple[Repaint, ...], tuple[float, float, float]]
 
 
 @dataclass(frozen=True, eq=False)
 class TargetShades:
-    """Bakes what each target of a sequence hides; the last `MOST` are kept."""
+    """Bakes the occlusion by each target of a sequence; the latest `MOST` are cached."""
 
     _known: dict[Key, Hidden] = field(default_factory=dict[Key, Hidden])
     _joined: list[tuple[tuple[Float32, ...], Float32]] = field(default_factory=list[tuple[tuple[Float32, ...], Float32]])
@@ -59,7 +61,7 @@ class TargetShades:
     def bake(self, arranged: Arranged, casters: Casters, unit: float, has_ground: bool, quality: Quality) -> Occlusion:
         """Return the occlusion by targets at their places, in a stage with the world's origin and this unit in metres.
 
-        The light of lamps and sky is not in the result yet: `with_ground_light` adds it.
+        The light of lamps and sky is not included yet: `with_ground_light` adds it.
         """
         if quality == "off":
             return NO_OCCLUSION
@@ -76,7 +78,7 @@ class TargetShades:
         return joined(hidden, poses, _reach(hidden, np.array(poses)), self._volume(hidden)) if hidden else NO_OCCLUSION
 
     def _volume(self, hidden: Sequence[Hidden]) -> Float32:
-        """That of all of them, which are the same at most instants."""
+        """The volumes of all of them, which are the same at most instants."""
         own = tuple({id(each.volume): each.volume for each in hidden}.values())
         if not (self._joined and len(own) == len(self._joined[0][0]) and all(map(is_, own, self._joined[0][0]))):
             self._joined[:] = [(own, joined_volumes(own))]
@@ -92,14 +94,14 @@ class TargetShades:
         if found is None:
             stands = casters.extent.ground_z is not None
             found = hidden_by(_alone(arranged, i, casters, _leveller(up), unit, stands), has_ground, fineness)
-        self._known[key] = found  # the last used comes last
+        self._known[key] = found  # the most recently used comes last
         if len(self._known) > MOST:
             del self._known[next(iter(self._known))]
         return found
 
 
 def _casting(arranged: Arranged) -> Iterator[int]:
-    """Yield the indices of the targets that are there and have a size."""
+    """Yield the indices of the targets that are present and have a size."""
     for i in range(arranged.targets):
         low, high = arranged.geometry.bounds[i]
         if arranged.things[i].is_there and (high - low).max() > 0:
@@ -107,7 +109,7 @@ def _casting(arranged: Arranged) -> Iterator[int]:
 
 
 def _fineness(arranged: Arranged, quality: Quality) -> Fineness:
-    """The same at all instants of a sequence."""
+    """The fineness, which is the same at all instants of a sequence."""
     count, fine = max(arranged.targets, 1), "fine" if quality == "fine" else "fast"
     size = next((n for n in MAPS if count * n**2 <= ALL_TEXELS), MAPS[-1])
     return Fineness(fine, min(MOST_CELLS, ALL_CELLS // count), size, count > 1 or arranged.has_scenery)
@@ -121,7 +123,7 @@ def _rounded_up(world_from_object: Matrix4) -> tuple[float, float, float]:
 
 
 def _leveller(up: tuple[float, float, float]) -> Float:
-    """The least turn (3, 3) that moves a unit vector to the vertical."""
+    """The smallest rotation (3, 3) that moves a unit vector to the vertical."""
     x, y, z = up
     if z < -1 + 1e-9:
         return np.diag([1.0, -1.0, -1.0])
@@ -130,7 +132,7 @@ def _leveller(up: tuple[float, float, float]) -> Float:
 
 
 def _levelled(world_from_object: Matrix4, unit: float) -> Float:
-    """Stage from the axes of baking (4, 4), in units: all that is left of a pose is a turn about the vertical, almost."""
+    """Stage from the axes of baking (4, 4), in units: only a rotation, almost about the vertical, remains of a pose."""
     pose, level = np.array(world_from_object), _leveller(_rounded_up(world_from_object))
     pose[:3, :3] = transform(pose[:3, :3], level)  # of rows of the leveller, which are columns of its inverse
     pose[:3, :3] = pose[:3, :3].T
@@ -139,7 +141,7 @@ def _levelled(world_from_object: Matrix4, unit: float) -> Float:
 
 
 def _alone(arranged: Arranged, i: int, casters: Casters, level: Float, unit: float, stands: bool) -> Casters:
-    """A target alone in the axes of baking, in units, with what it stands on at its lowest point, if it stands on anything."""
+    """A target alone in the axes of baking, in units, with the surface below it at its lowest point, if there is one."""
     geometry, surfaces, mesh = arranged.geometry, casters.surfaces, arranged.known[i]
     vertices = surfaces.vertices[geometry.vertex_start[i] : geometry.vertex_start[i + 1]].copy()
     vertices[:, :3] = transform(level, np.nan_to_num(mesh.normals))
@@ -154,7 +156,7 @@ def _alone(arranged: Arranged, i: int, casters: Casters, level: Float, unit: flo
 
 
 def _hovering(hidden: Hidden, pose: Float, ground: float) -> Hidden:
-    """The same above a ground of this height: as a disc of the same size it hides less the higher it is."""
+    """The occlusion above a ground of this height: like a disc of the same size, the target hides less the higher it is."""
     _, left, _, z, height = (float(v) for v in hidden.floor_frame[:5])
     radius = len(hidden.floor) / float(hidden.floor_frame[0]) / 2 - 0.9 * height
     above = max(float(transform(pose, [left + radius, left + radius, z])[2]) - ground, 0.0)
@@ -163,7 +165,7 @@ def _hovering(hidden: Hidden, pose: Float, ground: float) -> Hidden:
 
 
 def _reach(hidden: Sequence[Hidden], poses: Float) -> Float:
-    """Lowest and highest x, y, z in the stage of all that each of these hides in its pose, (N, 6)."""
+    """Lowest and highest x, y, z in the stage of the region that each of these occludes in its pose, (N, 6)."""
     which = np.indices((2, 2, 2)).reshape(3, 8).T
     corners = np.array([_span(own) for own in hidden])[:, which, np.arange(3)]
     placed = product(poses[:, :3, :3], corners.transpose(0, 2, 1)) + poses[:, :3, 3:]
@@ -171,7 +173,7 @@ def _reach(hidden: Sequence[Hidden], poses: Float) -> Float:
 
 
 def _span(hidden: Hidden) -> tuple[list[float], list[float]]:
-    """Lowest and highest x, y, z of all that is hidden, in the axes of baking."""
+    """Lowest and highest x, y, z of the occluded region, in the axes of baking."""
     *low, cells = (float(v) for v in hidden.frame[:4])
     high = [at + (points - 1) / cells for at, points in zip(low, hidden.volume.shape[2::-1], strict=True)]
     per, left, front, z, height, stands = (float(v) for v in hidden.floor_frame[:6])

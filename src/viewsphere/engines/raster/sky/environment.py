@@ -1,4 +1,4 @@
-"""Light from all directions: any sky baked into maps of what matt and shiny surfaces see of it, and into distant lights."""
+"""Light from all directions: a sky baked into maps for matt and shiny surfaces, and into distant lights."""
 
 from __future__ import annotations
 
@@ -27,14 +27,14 @@ from viewsphere.rendering.sky.sun import Distant, sun_light
 Float = NDArray[np.float64]
 
 _LEVELS = 8  # roughness 0 to 1
-_WIDE = 3  # level from which on a lobe is so wide that all texels of a map no wider than _COARSE are summed for it
+_WIDE = 3  # level above which a lobe is so wide that all texels of a map no wider than _COARSE are summed for it
 _COARSE = 64  # texels: wider maps are sampled for wide lobes, narrower ones are summed. Chosen by cost, not measured alone
 _SMALLEST = 32  # width of a map
-_SKY_WIDTH = 256  # width of the sharpest map of a sky that has no detail
+_SKY_WIDTH = 256  # width of the sharpest map of a sky without detail
 _PICTURE_WIDTH = 512  # width of the sharpest map of a photographed sky
-_SKY_HEIGHT = 256  # height of the picture that is made of a gradient or daylight
+_SKY_HEIGHT = 256  # height of the picture generated for a gradient or daylight
 _STEPS = np.array([2.0 ** (k - 24) for k in range(32)], np.float32)  # factors of a packed colour (RGB9_E5), by its exponent
-_DISC = 60.0  # greatest radiance of the sun's disc where it is seen: every such pixel is white anyway
+_DISC = 60.0  # maximum radiance of the visible sun's disc: every such pixel is white anyway
 
 # A photographed sun: a bright spot this far from its middle at most, so much above the mean and of so much of all light. Chosen
 # so that clear skies have a sun and overcast skies and windows of rooms have none; not measured on a collection.
@@ -47,20 +47,20 @@ _NO_LIGHT: Float = np.zeros((2, 3))
 
 
 SKY_ROUGHNESS = 0.12
-"""Of a mirror that blurs the sky about as far as to the next ray of those that are baked."""
+"""Roughness of a mirror whose blur reaches about to the next baked ray."""
 
 
 class Surrounding(NamedTuple):
-    """Light from all directions, as the shading kernels read it. float32 unless said.
+    """Light from all directions, as the shading kernels read it. float32 unless stated.
 
-    texels (N, 4): octahedral maps with a border, one after the other; colour, and the share that lies below the horizon;
-    levels (L, 4): first texel and width of a map and of the next map. The first map is for matt surfaces (radiance of a white
-    one), the others for equal steps of roughness from 0 to 1. light (6, 3): rows of `kernels_environment`, SCALE to BEHIND.
-    Radiance is the map's times SCALE plus ABOVE and BELOW times their shares; LAMPS: radiance that lamps give the ground close
-    by, not contained in BELOW; TURN: cosine and sine of the maps' turn about z. up (3,): radiance of a white level floor lit
-    from above the horizon alone. albedo (A, A, 2): see `lobe_albedo`.
+    texels (N, 4): octahedral maps with a border, one after the other; colour, and the share below the horizon; levels (L, 4):
+    first texel and width of a map and of the next map. The first map is for matt surfaces (radiance of a white one), the others
+    for equal steps of roughness from 0 to 1. light (6, 3): rows of `kernels_environment`, SCALE to BEHIND. Radiance is the
+    map's times SCALE plus ABOVE and BELOW times their shares; LAMPS: radiance of the nearby ground from lamps, not included in
+    BELOW; TURN: cosine and sine of the maps' turn about z. up (3,): radiance of a white level floor lit from above the horizon
+    alone. albedo (A, A, 2): see `lobe_albedo`.
 
-    The sky as the camera sees it: picture (P,) uint32, equirectangular, shared exponents; picture_levels (K, 3) int32: first
+    The sky visible to the camera: picture (P,) uint32, equirectangular, shared exponents; picture_levels (K, 3) int32: first
     texel, width and height; radiance is the picture's times SCALE plus BEHIND. sun (3, 3): the sun's direction, a glow around
     the sun, its disc of half_angle radians.
     """
@@ -82,24 +82,26 @@ class Surrounding(NamedTuple):
 
     @property
     def below(self) -> Float32:
-        """Radiance of what lies below the horizon, (3,), without the maps' own."""
+        """Radiance below the horizon, (3,), without the maps' own."""
         return self.light[kernels.BELOW]
 
     @property
     def lamps(self) -> Float32:
-        """Radiance that lamps give the ground close by, (3,)."""
+        """Radiance of the nearby ground from lamps, (3,)."""
         return self.light[kernels.LAMPS]
 
 
 def sky_along(surrounding: Surrounding, directions: Float32) -> Float32:
-    """Radiance from far away along rays (..., 3), blurred about as far as to the next ray."""
+    """Radiance from far away along rays (..., 3), with a blur that reaches about to the next ray."""
     light = np.empty(directions.shape, np.float32)
     sky_from(surrounding, directions.reshape(-1, 3), np.float32(SKY_ROUGHNESS), light.reshape(-1, 3))
     return light
 
 
 class _Maps(NamedTuple):
-    """The part of a baked sky that depends neither on its strength nor on its turn nor on what is below it: worth keeping."""
+    """The part of a baked sky that depends neither on its strength, nor on its turn, nor on the ground below it, and is
+    therefore cached.
+    """
 
     texels: Float32
     levels: Float32
@@ -115,9 +117,9 @@ class _Photographed(NamedTuple):
 
 
 def sky_lights(sky: AnySky, sun: Sun | None, has_ground: bool) -> tuple[Distant, ...]:
-    """The scene's sun and, of a photographed sky, the sun that is cut out of its picture; `bake_surrounding` bakes the rest.
+    """The scene's sun and, for a photographed sky, the sun that is cut out of its picture; `bake_surrounding` bakes the rest.
 
-    Raises UserError when the picture cannot be read.
+    Raises UserError if the picture cannot be read.
     """
     lights = [sun_light(sky, sun)]
     if isinstance(sky, Environment):
@@ -136,7 +138,7 @@ def environment_notes(sky: AnySky) -> tuple[str, ...]:
 
 
 def lamps_on_ground(lights: Lights, extent: Extent) -> Float:
-    """Mean irradiance / pi, (3,), that lamps give the ground around the targets, without what shadows take.
+    """Mean irradiance / pi, (3,), from lamps on the ground around the targets, without the light that shadows block.
 
     The mean is over a disc whose radius is half the diagonal of the targets' box.
     """
@@ -162,12 +164,12 @@ def bake_surrounding(
     even: Float = _NO_LIGHT,
     lamps: Float | None = None,
 ) -> Surrounding:
-    """Bake all light of the sky except `sky_lights`. The slow part is kept and depends on the sky alone.
+    """Bake all light of the sky except `sky_lights`. The slow part is cached and depends only on the sky.
 
     ground (3,): linear colour of a ground that hides the lower half and reflects the light it receives from the sky and from
-    `shadow_maps`; None for no ground: below a made sky there is grey, below a photographed one its own lower half.
-    even: radiance from above and below of hemisphere lights, (2, 3); lamps (3,): `lamps_on_ground`, None without lamps.
-    Raises UserError when a picture cannot be read.
+    `shadow_maps`; None without a ground: a generated sky is then grey below the horizon, a photographed one has its own lower
+    half. even: radiance from above and below of hemisphere lights, (2, 3); lamps (3,): `lamps_on_ground`, None without lamps.
+    Raises UserError if a picture cannot be read.
     """
     has_ground = ground is not None
     maps, scale, above, turn = _sky_parts(sky, sun, has_ground)
@@ -197,7 +199,9 @@ def bake_surrounding(
 
 
 def sky_behind(view: PictureRays, surrounding: Surrounding, radiance: Float32) -> None:
-    """Lay radiance (N, 4), scene-linear and premultiplied, over the sky, in place; no sky where the lens has no ray."""
+    """Composite radiance (N, 4), scene-linear and premultiplied, over the sky, in place; there is no sky if the lens has no
+    ray.
+    """
     cosine, sine = surrounding.light[kernels.TURN, :2]
     turn = np.array([[cosine, sine, 0], [-sine, cosine, 0], [0, 0, 1]], np.float64)
     to_map = turn @ view.rotation.T
@@ -252,7 +256,7 @@ def _visible_sun(sky: AnySky, sun: Sun | None) -> tuple[Float, float]:
 
 @lru_cache(maxsize=1)
 def _gradient_maps() -> _Maps:
-    """Maps that serve every gradient: how far each direction is from the horizon's colour towards the zenith's, 0 to 1."""
+    """Maps that all gradients use: the position of each direction between the horizon's colour and the zenith's, 0 to 1."""
     return kept_light(("gradient",), _make_gradient_maps, (_Maps,))
 
 
@@ -286,9 +290,10 @@ def _photographed(key: tuple[str, int, int], has_ground: bool) -> _Photographed:
 
 
 def without_sun(pixels: Float32) -> tuple[Float32, Distant | None]:
-    """An equirectangular picture without its sun, and that sun; the same picture and None if no small bright spot stands out.
+    """An equirectangular picture without its sun, and that sun; the unchanged picture and None if there is no small bright
+    spot.
 
-    The light of the spot beyond that of the sky around it goes to the sun, so that both together light a scene as before.
+    The spot's excess over the light of the sky around it goes to the sun, so that both together light a scene as before.
     """
     height, width = pixels.shape[:2]
     bright = pixels @ np.array([0.2126, 0.7152, 0.0722], np.float32)
@@ -325,7 +330,7 @@ def without_sun(pixels: Float32) -> tuple[Float32, Distant | None]:
 
 
 def _maps(lighting: Float32, width: int, has_ground: bool, seen: Float32 | None = None) -> _Maps:
-    """Bake an equirectangular picture of the light, and with `seen` another one that the camera sees in its place."""
+    """Bake an equirectangular picture of the light, and, if `seen` is given, another one that replaces it for the camera."""
     pictures = [lighting if seen is None else seen]
     while min(pictures[-1].shape[:2]) >= 8:
         pictures.append(_half(pictures[-1]))
@@ -439,7 +444,7 @@ def _half(picture: Float32) -> Float32:
 
 
 def _halved(values: Float32) -> Float32:
-    """An octahedral map at half its size; each texel counts by its solid angle."""
+    """An octahedral map at half its size; each texel is weighted by its solid angle."""
     area = _solid_angles(len(values))[..., None]
     return _quarters(values * area) / _quarters(area)
 
@@ -456,8 +461,8 @@ def _bordered(values: Float32) -> Float32:
 def _lobe_samples(rough: float, rings: int, width: int, levels: int) -> Float32:
     """Directions around +z where GGX of this perceptual roughness mirrors a ray along its normal, (S, 5).
 
-    Columns: x, y, z; weights that add up to 1 (Karis 2013); the mip level, of maps of `width`, whose texels are as large as the
-    solid angle that the sample stands for.
+    Columns: x, y, z; weights that add up to 1 (Karis 2013); the mip level, in maps of `width`, whose texels have the solid
+    angle that the sample represents.
     """
     square, spokes = rough**4, rings + 4
     quantile, spoke = np.meshgrid((np.arange(rings) + 0.5) / rings, np.arange(spokes), indexing="ij")
@@ -476,13 +481,13 @@ def _lobe_samples(rough: float, rings: int, width: int, levels: int) -> Float32:
 
 @lru_cache(maxsize=1)
 def lobe_albedo() -> Float32:
-    """`make_lobe_albedo`, kept."""
+    """The cached result of `make_lobe_albedo`."""
     return kept_light(("lobe albedo",), make_lobe_albedo, ())
 
 
 def make_lobe_albedo(size: int = 32) -> Float32:
-    """Share of white light that GGX with height-correlated Smith reflects altogether, (size, size, 2): by perceptual roughness
-    and by the square root of the cosine to the viewer, both from 0 to 1.
+    """The share of white light that GGX with height-correlated Smith reflects in total, (size, size, 2): by perceptual
+    roughness and by the square root of the cosine to the viewer, both from 0 to 1.
 
     Column 0 is for a Fresnel factor of 1, column 1 for Schlick's power alone: a surface of reflectance f reflects f times
     column 0 plus (1 - f) times column 1. Integrated over visible normals (Heitz 2018).

@@ -1,7 +1,7 @@
-"""Maps of all directions: octahedral maps of what rough surfaces see, made of an equirectangular picture, and the visible sky.
+"""Maps of all directions: octahedral maps for rough surfaces, made from an equirectangular picture, and the visible sky.
 
 Octahedral maps (Engelhardt and Dachsbacher 2008) need no trigonometry and have no poles. z is up. The equirectangular picture
-is Blender's: its middle lies towards +X, its left quarter towards +Y; the first row is up.
+follows Blender: its middle is towards +X, its left quarter towards +Y; the first row is up.
 """
 
 from __future__ import annotations
@@ -57,9 +57,9 @@ def _coordinates(x, y, z):
 def octahedral(picture, has_ground, out):
     """Add the octahedral map of an equirectangular picture (H, W, 3) to `out` (N, N, 4), which is 0 before.
 
-    Columns: colour, and the share that lies below the horizon.
+    Columns: colour, and the share below the horizon.
 
-    With ground, that share shows no colour: the ground's light is added when the map is read.
+    With a ground, that share has no colour: the ground's light is added when the map is read.
     """
     height, width, size = picture.shape[0], picture.shape[1], out.shape[0]
     for i in range(size):
@@ -188,7 +188,7 @@ def _blend_texels(w):
 
 @inner(fastmath=FAST)
 def _rays(listed, columns, start, count, w):
-    """RX, RY, RZ: directions of some samples, or their places in the image; samples of a grid lie in one row."""
+    """RX, RY, RZ: directions of some samples, or their places in the image; samples of a grid are in one row."""
     if listed.shape[1] == 3:
         for i in range(count):
             ray = listed[U(start + i)]
@@ -206,7 +206,7 @@ def _rays(listed, columns, start, count, w):
 
 @lanewise
 def _aim(numbers, width, height, w):
-    """RU, RV: where in the picture the rays end; TOWARD: cosines of their angles to the sun."""
+    """RU, RV: the places in the picture where the rays end; TOWARD: cosines of their angles to the sun."""
     ray = w.get(RX, RY, RZ)
     x, y, z = (dot(tuple(numbers.one(3 * row + k) for k in range(3)), ray) for row in range(3))
     flat = x * x + y * y
@@ -231,7 +231,8 @@ def _add_sun(numbers, w):
 
 @njit(fastmath=FAST)
 def lay_over_sky(listed, columns, numbers, picture, first, width, height, w, radiance):
-    """Lay radiance (N, 4), scene-linear and premultiplied, over the sky, in place; no sky where the lens has no ray.
+    """Composite radiance (N, 4), scene-linear and premultiplied, over the sky, in place; there is no sky if the lens has no
+    ray.
 
     listed: rays (N, 3) or places (N, 2) of the samples; empty, (0, 2), for a grid of `columns` columns. numbers: (26,), put
     together by `environment.sky_behind`. picture: `Surrounding.picture`; first, width, height: the mip level to read. w:

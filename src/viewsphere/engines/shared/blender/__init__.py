@@ -1,4 +1,4 @@
-"""The engines `cycles`, `eevee` and `workbench`, but for their names and flags: they differ only in Blender's renderer."""
+"""The engines `cycles`, `eevee` and `workbench`, except for their names and flags: they differ only in Blender's renderer."""
 
 from __future__ import annotations
 
@@ -22,8 +22,8 @@ PROGRAMS = (Path(__file__).parent, Path(__file__).parents[3] / "blender" / "work
 
 
 def check(options: Mapping[str, JsonValue], renderer: str) -> None:
-    """Raise UserError for an option that is not known (with the nearest name), out of range, without a Blender, or for a script
-    that is not there or not allowed.
+    """Raise UserError for an unknown option (with the nearest name), a value out of range, a missing Blender, or a script that
+    is missing or not allowed.
     """
     from viewsphere.blender.interpreter import find_blender
     from viewsphere.engines.shared.blender.options import options_of
@@ -35,9 +35,9 @@ def check(options: Mapping[str, JsonValue], renderer: str) -> None:
 
 
 def stage(shot: Shot, load: Load) -> CyclesStage:
-    """Build the shot's scene in Blender, and its geometry here; the shot's engine says which renderer paints it.
+    """Build the shot's scene in Blender, and its geometry here; the shot's engine selects the renderer.
 
-    Raises UserError for an unknown engine option or one out of range, or where Blender cannot be used.
+    Raises UserError for an unknown engine option, a value out of range, or a Blender that cannot be used.
     """
     from viewsphere.engines.shared.blender.staging import build_stage
 
@@ -59,7 +59,7 @@ def save(shot: Shot, samples: Sequence[Sample], load: Load, file: Path, data: st
 
 
 def shows_sky(shot: Shot, finish: Finish) -> bool:
-    """Return whether a picture of a shot has the sky where nothing else is; `save` needs frames that agree in this."""
+    """Return whether a picture of a shot shows the sky behind all things; `save` needs frames that agree in this."""
     from viewsphere.engines.shared.blender import saving
 
     return saving.shows_sky(shot, finish)

@@ -1,4 +1,4 @@
-"""The sky, and the ground that fades into it, laid behind pictures of a renderer that has neither."""
+"""The sky, and the ground that fades into it, composited behind pictures of a renderer that has neither."""
 
 from __future__ import annotations
 
@@ -27,8 +27,8 @@ Float32 = NDArray[np.float32]
 
 @dataclass(frozen=True, eq=False)
 class Backdrop:
-    """The backdrop of a shot. middle (3,) and unit: centre and half the extent of all placed things, world metres; ground:
-    index of the ground's first triangle.
+    """The backdrop of a shot. middle (3,) and unit: centre and half the extent of all placed things, in world metres; ground:
+    the number of the ground's first triangle.
     """
 
     sky: SkyPictures
@@ -62,7 +62,7 @@ class Backdrop:
 
     def _left(self, away: Float, rise: Float, camera: Camera, triangle: NDArray[np.int32]) -> Float32:
         """The share (H, W) of each pixel that has not faded, by distance `away` and the ray's `rise` (sine of its elevation): 1
-        on everything that stands on the ground, 0 beyond the ground's end.
+        on everything above the ground, 0 beyond the ground's end.
         """
         behind = np.where(np.isfinite(away), away, 0) - np.linalg.norm(self.middle - camera.center)
         near = np.clip(1 - (behind / self.unit - BEGIN) / OVER, 0, 1)
@@ -102,7 +102,8 @@ def _smooth(x: Float) -> Float:
 
 
 def veil(picture: Float32, fog: Fog, camera: Camera, geometry: Geometry, is_outdoors: bool = False) -> None:
-    """Veil what a picture (H, W, 4), premultiplied, without its sky shows, in place; of fog that `is_outdoors` its ground."""
+    """Apply fog in place to a picture (H, W, 4), premultiplied, without its sky; fog that `is_outdoors` covers only the ground.
+    """
     seen = rasterize(geometry, camera, subdivision=2)
     rays = pixel_rays(camera.intrinsics, 2).reshape(-1, 3)
     depth = Air.of(fog, camera, rays).depth(seen.inverse_depth.reshape(-1))
@@ -116,7 +117,7 @@ def veil(picture: Float32, fog: Fog, camera: Camera, geometry: Geometry, is_outd
 
 
 def lay_sky(picture: Float32, fog: Fog, camera: Camera, backdrop: Backdrop | None) -> None:
-    """Lay a veiled picture over the sky as fog shows it, in place; without a backdrop there is fog alone."""
+    """Composite a veiled picture over the sky seen through fog, in place; without a backdrop, only fog is behind it."""
     rows = picture.reshape(-1, 4)
     hidden = rows[:, 3].copy()
     sky = np.zeros((len(rows), 3), np.float32)

@@ -1,4 +1,4 @@
-"""The part of a picture in which anything can be seen."""
+"""The part of a picture in which anything is visible."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ AROUND = 2
 
 
 def border_of(geometry: Geometry, camera: Camera) -> tuple[int, int, int, int]:
-    """Pixels x0, y0, x1, y1 outside of which a pinhole without skew sees nothing of the scene; all 0 where it sees nothing."""
+    """Pixels x0, y0, x1, y1 outside of which a pinhole without skew sees nothing of the scene; all 0 if it sees nothing."""
     width, height = camera.width, camera.height
-    # Twice of each side: room for what the filter spreads into the picture. Where all hold, z is positive.
+    # Twice of each side: room for surfaces that the filter spreads into the picture. If all hold, z is positive.
     sides = np.array([(1, 0, AROUND), (-1, 0, width + AROUND), (0, 1, AROUND), (0, -1, height + AROUND)], float)
-    places = homogeneous(geometry, camera, 0, len(geometry.coordinates))[:, :3]  # also of things that lie beside the picture
+    places = homogeneous(geometry, camera, 0, len(geometry.coordinates))[:, :3]  # also of things beside the picture
     x, y, z = places.T
-    beyond = np.zeros(len(places), np.uint8)  # the sides beyond which a vertex lies, a bit each
+    beyond = np.zeros(len(places), np.uint8)  # the sides that a vertex is beyond, a bit each
     for bit, (across, down, room) in enumerate(sides):
         beyond |= (across * x + down * y + room * z < 0).astype(np.uint8) << bit
     a, b, c = beyond[geometry.triangles.T]
@@ -41,7 +41,7 @@ def border_of(geometry: Geometry, camera: Camera) -> tuple[int, int, int, int]:
 
 
 def _clipped(polygons: Float, sides: Float) -> Float:
-    """The corners (M, 3), some of them more than once, of what lies within all sides of convex polygons (N, K, 3).
+    """The corners (M, 3), some of them repeated, of the parts of convex polygons (N, K, 3) inside all sides.
 
     Sutherland and Hodgman, Reentrant Polygon Clipping, 1974.
     """

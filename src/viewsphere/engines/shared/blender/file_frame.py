@@ -17,14 +17,14 @@ Request = dict[str, Any]
 
 @dataclass(frozen=True, eq=False)
 class FileFrame:
-    """`file_from_world` (4, 4) is rigid, in metres; `unit` the metres in one unit of the file."""
+    """`file_from_world` (4, 4) is rigid, in metres; `unit` is the number of metres in one unit of the file."""
 
     file_from_world: Float
     unit: float
 
     @classmethod
     def of(cls, blend: BlendScene | None) -> FileFrame:
-        """The frame of the .blend file; without a file the identity."""
+        """The frame of the .blend file; the identity without a file."""
         if blend is None:
             return cls(np.eye(4), 1.0)
         world_from_file = np.array(blend.world_from_file)

@@ -1,4 +1,4 @@
-"""Cycles' own pass of object indices: an independent picture of which object each pixel sees."""
+"""Cycles' own pass of object indices: an independent image of the object visible in each pixel."""
 
 from __future__ import annotations
 
@@ -17,15 +17,15 @@ from viewsphere.errors import BlenderError, UserError
 from viewsphere.model.shot import Shot
 
 SHARP = {"pixel_filter_type": "GAUSSIAN", "filter_width": 0.01}
-"""Settings of Cycles by which it looks through the middles of pixels alone."""
+"""Settings of Cycles that make it sample only the middles of pixels."""
 
 
 def indices(shot: Shot, instant: int, sensor: int, load: Load) -> NDArray[np.int32] | None:
     """Ids of the objects that Cycles sees through the middles of a sensor's pixels at an instant, (H, W) int32, 0 for none;
-    None for a lens that Blender has not.
+    None for a lens that Blender lacks.
 
-    A Blender that dies or hangs is started again, once. Raises ModelError when it dies again, UserError where Blender cannot be
-    used, or cannot build the scene.
+    A Blender that dies or hangs is restarted once. Raises ModelError if it dies again, UserError if Blender cannot be used, or
+    cannot build the scene.
     """
     camera = shot.camera(instant, sensor)
     if not camera.lens.is_linear or camera.intrinsics.skew:
@@ -43,7 +43,7 @@ def indices(shot: Shot, instant: int, sensor: int, load: Load) -> NDArray[np.int
 
 
 def _rendered(stage: Arrangement, view: dict[str, Any]) -> NDArray[np.int32]:
-    """The ids that Blender's pass has, seen by a camera."""
+    """The ids in Blender's pass, for a camera."""
     process = stage.keeper.process_for(stage)
     out = process.folder / "seen.npy"
     process.ask("number", STAGE_SECONDS, members=members_of(stage.shot), alpha=stage.shot.label_alpha)

@@ -1,5 +1,4 @@
-"""Lenses that Blender's camera does not have: pinhole pictures are rendered that cover the lens's rays, and are sampled along
-them.
+"""Lenses that Blender's camera lacks: pinhole pictures that cover the lens's rays are rendered, then sampled along these rays.
 
 Labels are not affected: truth casts the lens's rays itself.
 """
@@ -21,7 +20,9 @@ from viewsphere.model.sensors.camera import Camera, Intrinsics
 from viewsphere.model.shot import Shot
 
 MOMENTS = 9
-"""Evenly spaced moments, from opening to closing, at which Blender is told where things are: as many as Cycles looks at."""
+"""Number of evenly spaced moments of the exposure, from opening to closing, at which Blender gets the poses of things: as many
+as Cycles evaluates.
+"""
 
 
 Float = NDArray[np.float64]
@@ -49,10 +50,10 @@ FACES: tuple[tuple[tuple[int, int, int], ...], ...] = (
 
 @dataclass(frozen=True, eq=False)
 class PinholeView:
-    """A covering pinhole picture: its `camera`, and where the rays of the lens's pixels meet it.
+    """A covering pinhole picture: its `camera`, and the places where the rays of the lens's pixels meet it.
 
-    pixels (N,): indices of the lens's pixels that this picture serves; x, y (N,): where their rays meet the picture, in its
-    pixels. All three are None where the covering picture is the lens's picture, pixel by pixel.
+    pixels (N,): indices of the lens's pixels that this picture serves; x, y (N,): the places of their rays in the picture, in
+    its pixels. All three are None if the covering picture is the lens's picture, pixel by pixel.
     """
 
     camera: Camera
@@ -62,8 +63,10 @@ class PinholeView:
 
 
 def views_of(camera: Camera) -> tuple[PinholeView, ...]:
-    """The covering pictures of a camera: the camera's own for a pinhole without skew, one that is somewhat wider for a lens
-    that bends rays a little, else up to six sides of a cube.
+    """The covering pictures of a camera.
+
+    They are the camera's own picture for a pinhole without skew, a slightly wider one for a lens that bends rays slightly,
+    otherwise up to six sides of a cube.
     """
     if camera.lens.is_linear and camera.intrinsics.skew == 0:
         return (PinholeView(camera),)
@@ -93,7 +96,8 @@ def _view(camera: Camera, face: Float, pixels: NDArray[np.int64], rays: Float) -
 
 
 def resampled(camera: Camera, views: Sequence[PinholeView], pictures: Sequence[Float32], mixed: bool = True) -> Float32:
-    """The lens's picture (H, W, C) float32, bilinear, or not `mixed` the nearest pixels; empty where it has no ray."""
+    """The lens's picture (H, W, C) float32, bilinear, or from the nearest pixels if not `mixed`; empty in pixels without a ray.
+    """
     channels = pictures[0].shape[2]
     out = np.zeros((camera.height * camera.width, channels), np.float32)
     for view, picture in zip(views, pictures, strict=True):
@@ -114,7 +118,9 @@ def _bilinear(picture: Float32, x: Float, y: Float) -> NDArray[Any]:
 
 @dataclass(frozen=True, eq=False)
 class Sweeping:
-    """A sensor's picture at an instant, both counted from 0 in the shot, while the shutter is open. What deforms does not."""
+    """A sensor's picture at an instant, both counted from 0 in the shot, during the exposure. Deforming things keep their
+    shape.
+    """
 
     shot: Shot
     instant: int
@@ -126,8 +132,8 @@ class Sweeping:
         return self.request(0) is None
 
     def request(self, view: int) -> dict[str, Any] | None:
-        """For the worker's `render` of one of the `views_of` the sensor's camera: matrices of objects that move, by their
-        places among all, and the camera's rotations and centres; None where nothing moves.
+        """The part of the worker's `render` request for one of the `views_of` the sensor's camera: matrices of moving objects,
+        by their index, and the camera's rotations and centres. None if nothing moves.
         """
         exposure = self.shot.exposures[self.instant] if self.shot.shutter else None
         if exposure is None:

@@ -20,8 +20,8 @@ Device = Literal["cpu", "cuda", "optix", "hip", "metal", "oneapi"]
 class Common:
     """Options of every renderer.
 
-    samples: per pixel; threads: of one Blender, 0 for all cores; python: the interpreter that has bpy, None to look for it;
-    replace_after: shots after which Blender is started anew, 0 for never; script: a Python file that changes the staged
+    samples: per pixel; threads: of one Blender, 0 for all cores; python: the interpreter that has bpy, None to search for it;
+    replace_after: number of shots after which Blender is restarted, 0 for never; script: a Python file that changes the staged
     scene; settings: the renderer's own, by their names in Python.
     """
 
@@ -43,7 +43,9 @@ class Common:
 
 @dataclass(frozen=True)
 class Options(Common):
-    """Options of Cycles. denoise: off, fast or best (Open Image Denoise); bounces: of light; device: the kind that computes."""
+    """Options of Cycles. denoise: off, fast or best (Open Image Denoise); bounces: of light; device: the kind of device that
+    renders.
+    """
 
     renderer = "cycles"
     title = "Cycles"
@@ -55,7 +57,7 @@ class Options(Common):
 
 @dataclass(frozen=True)
 class Eevee(Common):
-    """Options of EEVEE. raytracing: adds reflections of visible surfaces in others, and shading by near ones."""
+    """Options of EEVEE. raytracing: adds reflections of visible surfaces in others, and shading by nearby ones."""
 
     renderer = "eevee"
     title = "EEVEE"
@@ -82,7 +84,7 @@ PRESETS = {
     "good": Options(),
     "final": Options(samples=256, denoise="best", bounces=8),
 }
-"""Cycles' options for each `quality`, from which other given options depart."""
+"""Cycles' options for each `quality`; other given options override them."""
 
 EEVEE_PRESETS = {"draft": Eevee(samples=4, raytracing=False), "good": Eevee(), "final": Eevee(samples=64)}
 WORKBENCH_PRESETS = {"draft": Workbench(samples=5), "good": Workbench(), "final": Workbench(samples=32)}
@@ -100,8 +102,8 @@ def parse_options(given: Mapping[str, JsonValue]) -> Options:
 
 
 def options_of(renderer: str, given: Mapping[str, JsonValue]) -> AnyOptions:
-    """A renderer's checked options. Raises RecipeError, which begins with the recipe's field, for an unknown name (with the
-    nearest) or a value out of range.
+    """A renderer's checked options. Raises RecipeError, whose message begins with the recipe's field, for an unknown name (with
+    the nearest) or a value out of range.
     """
     if renderer == "eevee":
         return _parsed(given, EEVEE_PRESETS)

@@ -1,4 +1,4 @@
-"""A shot as the plain data and arrays that Blender's worker stages (`viewsphere.blender.worker.scene.staging`)."""
+"""A shot as plain data and arrays, from which Blender's worker builds a scene (`viewsphere.blender.worker.scene.staging`)."""
 
 from __future__ import annotations
 
@@ -30,10 +30,10 @@ from viewsphere.rendering.sky.sun import sun_light
 from viewsphere.truth.raster.geometry import Geometry
 
 TEXELS = 1024
-"""Side of the slabs' picture; it shows `PERIOD` slabs a side."""
+"""Side of the slabs' texture in texels; it shows `PERIOD` slabs a side."""
 
 _BRIGHTEST = 1.44
-"""No shade of the slabs is greater."""
+"""Upper limit of all shades of the slabs."""
 
 
 Put = Callable[[NDArray[Any]], str]
@@ -89,14 +89,14 @@ def scene_request(
 
 
 def staged(things: Sequence[Thing], scene: Scene) -> list[int]:
-    """Positions of the things that are put into the scene, in the worker's order: those that are there, and that a .blend scene
-    does not contain already.
+    """Indices of the things that are put into the scene, in the worker's order: those that are present, and that a .blend scene
+    does not already contain.
     """
     return [i for i, thing in enumerate(things) if thing.is_there and (scene.blend is None or thing.model.parts is None)]
 
 
 def members_of(shot: Shot) -> dict[str, int]:
-    """Ids of a shot's objects by the names of the objects of a user's .blend scene that they are made of."""
+    """Ids of a shot's objects by the names of their objects in a user's .blend scene."""
     return {name: thing.id for thing in shot.objects for name in (thing.model.parts and thing.model.parts.only) or ()}
 
 
@@ -110,7 +110,7 @@ def kinds_of(things: Sequence[Thing], meshes: Sequence[Mesh], scene: Scene) -> t
 
 
 def materials_request(kinds: Sequence[Kind], put: Put, levels: Sequence[Levels] | None) -> list[Request]:
-    """Pictures and materials of each kind; pictures that kinds have in common are put once."""
+    """Textures and materials of each kind; textures shared by several kinds are written once."""
     paths: dict[int, str] = {}
 
     def put_once(pixels: NDArray[Any]) -> str:
@@ -191,8 +191,8 @@ def _ground_request(ground: Ground, geometry: Geometry, has_scenery: bool, put: 
 
 
 def extent(geometry: Geometry, has_scenery: bool) -> tuple[NDArray[np.float64], float]:
-    """Centre (3,) and half the diagonal of all placed things, world metres; with scenery the origin and the next power of two,
-    so that both stay the same when the targets change.
+    """Centre (3,) and half the diagonal of all placed things, in world metres. With scenery, they are the origin and the next
+    power of two, so that both stay the same when the targets change.
     """
     if not geometry.triangle_start[-1]:
         return np.zeros(3), 1.0
@@ -202,13 +202,13 @@ def extent(geometry: Geometry, has_scenery: bool) -> tuple[NDArray[np.float64], 
 
 
 def middle_of(geometry: Geometry, count: int) -> NDArray[np.float64]:
-    """Centre (3,) of the box around the first so many things, world metres."""
+    """Centre (3,) of the box around the first `count` things, in world metres."""
     low, high = geometry.extent(count)
     return (low + high) / 2
 
 
 def _lights_request(scene: Scene, middle: NDArray[np.float64]) -> list[Request]:
-    """The sun, as the sky lets it through, and the lamps; hemisphere lights are part of the world's picture."""
+    """The sun, attenuated by the sky, and the lamps; hemisphere lights are part of the world's picture."""
     request: list[Request] = []
     sun = sun_light(scene.sky, scene.sun) if scene.blend is None or not scene.blend.is_lit else None
     if sun is not None:
@@ -248,7 +248,7 @@ def _hemispheres(scene: Scene, pictures: SkyPictures) -> list[list[float]]:
 
 
 def laid_with_slabs(material: Material) -> tuple[Material, tuple[Image, ...]]:
-    """The ground's material with a picture of its slabs."""
+    """The ground's material with a texture of its slabs."""
     r, g, b, a = material.base_color
     picture = _slab_picture()
     used = replace(

@@ -29,13 +29,13 @@ from viewsphere.rendering.view import EXPOSURE
 from viewsphere.rendering.white import NEUTRAL_K
 
 NEAREST, FARTHEST = 1e-3, 1e5
-"""The camera's clipping range, in distances to its target: with a larger one surfaces would flicker in Blender's windows."""
+"""The camera's clipping range, in distances to its target: with a larger one, surfaces would flicker in Blender's windows."""
 
 SAME = 1e-6
 """Targets that differ by less, in camera distances, count as the same target."""
 
 MOST_OFF = 1e-4
-"""Largest error of the camera that needs no note, in distances to its target: nobody would see it."""
+"""Largest error of the camera that needs no note, in distances to its target: it is invisible."""
 
 TEXT = """\
 {name}, which viewsphere made from the data set {data}.
@@ -51,10 +51,10 @@ The pass index of an object is its number in the data set's instance maps; its c
 def save(shot: Shot, samples: Sequence[Sample], load: Load, file: Path, data: str) -> tuple[str, ...]:
     """Write a shot's scene, with the cameras of these samples, which are those of its frames, in order.
 
-    The pictures have one size and shape of pixels, and all or none of them show the sky. A shot of another engine is
-    written as Cycles would render it. Backgrounds that change lie beside the file, in a folder of its name. `data` is the data
-    set's name. Returns a line for everything that the file could not keep. Raises UserError where Blender cannot be used,
-    ModelError where Blender dies twice.
+    The pictures have one size and shape of pixels, and all or none of them show the sky. A shot of another engine is written as
+    Cycles would render it. Changing backgrounds are stored next to the file, in a folder with its name. `data` is the data
+    set's name. Returns a line for each thing that the file could not store. Raises UserError if Blender cannot be used,
+    ModelError if Blender dies twice.
     """
     script: tuple[str, ...] = ()
     kept = shot.engine_options if shot.engine == "cycles" else {"python": shot.engine_options.get("python")}
@@ -74,12 +74,12 @@ def is_clear(shot: Shot) -> bool:
 
 
 def shows_sky(shot: Shot, finish: Finish) -> bool:
-    """Return whether a picture of a shot has the sky where nothing else is."""
+    """Return whether a picture of a shot shows the sky behind all things."""
     return not is_clear(shot) and finish.background.color is None and finish.background.image is None
 
 
 def _ask(stage: Arrangement, request: dict[str, Any], finishes: Sequence[Finish], camera: Camera, file: Path) -> float:
-    """Ask Blender to write the file; returns the largest error of its cameras, in the file's units."""
+    """Request Blender to write the file; return the largest error of its cameras, in the file's units."""
     process = stage.keeper.process_for(stage)
     background, sequence = None, ""
     if request["is_open"] and not request["transparent"] and not request["is_users"]:
@@ -93,7 +93,7 @@ def _ask(stage: Arrangement, request: dict[str, Any], finishes: Sequence[Finish]
             assert display is not None
             pixels = np.round(encoded(display) * 255).astype(np.uint8).reshape(camera.height, camera.width, 3)
             (folder / f"{number:04d}.png").write_bytes(encode_png(pixels))
-    saved = process.folder / "saved.blend"  # Blender may be kept from writing anywhere else
+    saved = process.folder / "saved.blend"  # Blender may be forbidden to write anywhere else
     answer = process.ask("save", STAGE_SECONDS, **request, file=str(saved), background=background, sequence=sequence)
     shutil.move(saved, file)
     return answer["off"]
@@ -120,7 +120,7 @@ def _request(shot: Shot, samples: Sequence[Sample], finishes: Sequence[Finish], 
 
 
 def _poses_request(samples: Sequence[Sample], frame: FileFrame) -> list[dict[str, Any]]:
-    """The rig's pose at every sample, as an orbit around a point on the camera's axis, also for 6 DoF poses."""
+    """The rig's pose at each sample, as an orbit around a point on the camera's axis, even for 6 DoF poses."""
     poses: list[dict[str, Any]] = []
     nearest, farthest = (f(sample.pose.distance for sample in samples) for f in (min, max))
     still = np.full(3, np.inf)

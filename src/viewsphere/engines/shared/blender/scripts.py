@@ -1,4 +1,6 @@
-"""A user's own script, which changes what Blender has staged before that is painted: run only where the user allows it."""
+"""A user's own script, which changes the scene that Blender has staged before it is painted; it runs only if the user allows
+it.
+"""
 
 from __future__ import annotations
 
@@ -16,7 +18,7 @@ from viewsphere.model.thing import Thing
 
 
 def check_script(script: str | None) -> None:
-    """Raise RecipeError for a script that is not there, or that nobody has allowed to run."""
+    """Raise RecipeError for a script that is missing, or that is not allowed to run."""
     if script is None:
         return
     if not Path(script).is_file():

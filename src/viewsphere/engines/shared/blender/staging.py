@@ -39,33 +39,33 @@ from viewsphere.truth.raster.geometry import Geometry
 from viewsphere.truth.raster.visibility import Visibility
 
 STAGE_SECONDS = 600.0
-"""Seconds after which a Blender that has not built its scene counts as hanging."""
+"""Seconds after which a Blender that has not built its scene counts as hung."""
 
 FRAME_SECONDS = 3600.0
 
 FIRST_SECONDS = 900.0
-"""Seconds after which a renderer that has not drawn its first, tiny picture counts as hanging: it compiles its shaders first,
-which without a graphics card takes from seconds to minutes.
+"""Seconds after which a renderer that has not drawn its first, tiny picture counts as hung. It compiles its shaders first,
+which takes from seconds to minutes without a graphics card.
 """
 
 NEAREST, FARTHEST = 1e-3, 1e7
 """Clipping range of cameras that trace rays (Cycles), metres."""
 
 SPARE = 4.0
-"""Factor by which the clipping range of cameras that draw exceeds the depths seen at the centres of pixels, at both ends."""
+"""Factor by which the clipping range of cameras that draw exceeds the visible depths at pixel centres, at both ends."""
 
 COMPONENTS = {"picture": 4, "light": 12, "objects": 3, "materials": 2}
-"""Results of a render, with their numbers a pixel: radiance and alpha; albedo, diffuse light, all other light and emission;
+"""Results of a render, with their values per pixel: radiance and alpha; albedo, diffuse light, all other light and emission;
 the albedo, from a render without the ground; roughness and metallic, from a render of the pixels' centres.
 """
 
 Float32 = NDArray[np.float32]
 
 Clip = tuple[float, float]
-"""Clipping range of a camera: least and greatest depth, metres."""
+"""Clipping range of a camera: minimum and maximum depth, in metres."""
 
 AllLevels = tuple[Levels, ...]
-"""Halvings of the pictures of each kind of model."""
+"""Halvings of the textures of each kind of model."""
 
 Answer = TypeVar("Answer")
 
@@ -86,7 +86,7 @@ class Keeper:
     _served: int = 0
 
     def process_for(self, stage: Arrangement, levels: AllLevels | None = None) -> BlenderProcess:
-        """A Blender that holds this stage's scene, with pictures halved by `levels`; None keeps the pictures as they are."""
+        """A Blender that holds this stage's scene, with textures halved by `levels`; None leaves the textures unchanged."""
         if self.process is not None and self._stage is stage:
             if levels is not None and levels != self._levels:
                 self._stage = None
@@ -107,7 +107,7 @@ class Keeper:
         return self.process
 
     def _try_drawing(self, process: BlenderProcess, options: AnyOptions) -> None:
-        """Test, once a renderer, that it can draw on this machine: without working OpenGL Blender crashes."""
+        """Test, once per renderer, that it can draw on this machine: without working OpenGL, Blender crashes."""
         self._stage = None
         try:
             process.ask("draw", FIRST_SECONDS, renderer=options.renderer)
@@ -119,8 +119,8 @@ class Keeper:
         self._drawing.add(options.renderer)
 
     def insist(self, ask: Callable[[], Answer], named: str) -> Answer:
-        """The answer of `ask`; a Blender that dies meanwhile is started again, once. Raises ModelError, which names what is
-        `named`, when Blender dies again.
+        """The answer of `ask`; if Blender dies meanwhile, it is restarted once. Raises ModelError, which mentions `named`, if
+        Blender dies again.
         """
         died: BlenderDied | None = None
         for _ in range(2):
@@ -132,7 +132,7 @@ class Keeper:
         raise ModelError(f"{named}: {died}")
 
     def forget(self) -> None:
-        """Take the scene that Blender holds for no stage's; the next picture has Blender build its scene."""
+        """Mark the scene in Blender as belonging to no stage; for the next picture, Blender builds its scene."""
         self._stage = None
 
     def drop(self) -> None:
@@ -154,7 +154,7 @@ def _started(python: Path, bounds: Bounds, threads: int) -> BlenderProcess:
 
 @cache
 def keeper_of(python: Path) -> Keeper:
-    """The keeper of this process's Blender for a Python interpreter; the same object at every call."""
+    """The keeper of this process's Blender for a Python interpreter; every call returns the same object."""
     return Keeper(python)
 
 
@@ -173,7 +173,7 @@ class CyclesStage:
         return self.arrangements.shot
 
     def of(self, shot: Shot) -> CyclesStage:
-        """A stage for another shot of an equal `stage_key`, which shares the loaded meshes."""
+        """A stage for another shot with an equal `stage_key`, which shares the loaded meshes."""
         return replace(self, arrangements=self.arrangements.of(shot))
 
     def at(self, instant: int) -> Geometry:
@@ -181,7 +181,7 @@ class CyclesStage:
         return self.arrangements.at(instant).geometry
 
     def arrangement(self, instant: int) -> Arrangement:
-        """The arrangement of all things at an instant; the stage keeps the last one."""
+        """The arrangement of all things at an instant; the stage caches the latest one."""
         now = self.arrangements.at(instant)
         if now.geometry not in self._arranged:
             self._arranged.clear()
@@ -193,8 +193,8 @@ class CyclesStage:
     def paint(self, instant: int, sensor: int, visibility: Visibility, names: Collection[str]) -> dict[str, NDArray[Any]]:
         """The named passes of a sensor at an instant, see `engines.Stage`.
 
-        The light of a sharp picture is parted as it is rendered; beside a blurred one it is rendered again. A Blender that dies
-        or hangs is started again, once. Raises ModelError when it dies again, UserError for an unreadable background image.
+        The light of a sharp picture is split during its rendering; for a blurred one, it is rendered again. A Blender that dies
+        or hangs is restarted once. Raises ModelError if it dies again, UserError for an unreadable background image.
         """
         sweeping, painted = Sweeping(self.shot, instant, sensor), dict[str, NDArray[Any]]()
         is_lit = not set(names).isdisjoint(LIGHT_PASSES)
@@ -215,7 +215,7 @@ class CyclesStage:
     def _picture(
         self, instant: int, sensor: int, visibility: Visibility, name: str, wanted: Sequence[str]
     ) -> dict[str, NDArray[Any]]:
-        """`rgb` or `rgba`, and what else is wanted of its render (see `COMPONENTS`)."""
+        """`rgb` or `rgba`, and the other wanted results of its render (see `COMPONENTS`)."""
         camera, arranged = self.shot.camera(instant, sensor), self.arrangement(instant)
         finish = self.shot.finish(instant).with_background(name == "rgba")
         background = display_background(finish.background, camera.width, camera.height)
@@ -238,7 +238,7 @@ class CyclesStage:
         albedo, diffuse, residual, emission = np.split(light, 4, axis=-1)
         ground = self.shot.scene.ground
         if ground is not None:
-            # Where the ground fades, it sends the light of the sky.
+            # Faded ground sends the light of the sky.
             is_far = (visibility.triangle < 0) | (visibility.triangle >= self.at(instant).triangle_start[-1])
             emission = np.where(is_far[..., None], np.float32(0), emission)
         if ground is not None and ground.catcher:
@@ -257,7 +257,7 @@ class CyclesStage:
 
 @dataclass(frozen=True, eq=False)
 class Arrangement:
-    """A shot's things as they stand at an instant, as a scene that Blender builds and keeps."""
+    """A shot's things at an instant, as a scene that Blender builds and keeps."""
 
     shot: Shot
     things: Sequence[Thing]
@@ -277,15 +277,15 @@ class Arrangement:
     def painted(
         self, camera: Camera, is_open: bool, visibility: Visibility, sweeping: Sweeping, wanted: Sequence[str] = ()
     ) -> dict[str, Float32]:
-        """A `picture`, scene-linear, premultiplied, (H, W, 4) float32, and what else is wanted of it (see `COMPONENTS`); with
-        `is_open` the background is left empty.
+        """A `picture`, scene-linear, premultiplied, (H, W, 4) float32, and its other wanted results (see `COMPONENTS`); with
+        `is_open`, the background stays empty.
         """
         if self.options.draws:
             return {"picture": self._drawn(camera, is_open, visibility, sweeping)}
         return self.rendered(camera, is_open, sweeping=sweeping, wanted=wanted)
 
     def _drawn(self, camera: Camera, is_open: bool, visibility: Visibility, sweeping: Sweeping) -> Float32:
-        """The picture of a renderer that draws: with a tight clipping range, as the depth buffer has a limited precision."""
+        """The picture of a renderer that draws, with a tight clipping range because of the depth buffer's limited precision."""
         clip = clip_of(visibility, self.geometry, camera)
         if self.backdrop is None:
             return self._radiance(camera, is_open, clip, sweeping)
@@ -299,13 +299,13 @@ class Arrangement:
 
     @cached_property
     def sky(self) -> Backdrop | None:
-        """The sky and the ground's fading; None where the scene is a user's own."""
+        """The sky and the ground's fading; None if the scene is a user's own."""
         return None if self.shot.scene.blend is not None else Backdrop.of(self.shot, self.geometry)
 
     def _radiance(
         self, camera: Camera, is_open: bool, clip: Clip = (NEAREST, FARTHEST), sweeping: Sweeping | None = None
     ) -> Float32:
-        """Scene-linear, premultiplied, (H, W, 4) float32; a Blender that dies is started again, once."""
+        """The picture, scene-linear, premultiplied, (H, W, 4) float32; a Blender that dies is restarted once."""
         return self.rendered(camera, is_open, clip, sweeping)["picture"]
 
     def rendered(
@@ -316,12 +316,12 @@ class Arrangement:
         sweeping: Sweeping | None = None,
         wanted: Sequence[str] = (),
     ) -> dict[str, Float32]:
-        """A `picture`, and what else is wanted of its render; a Blender that dies is started again, once."""
+        """A `picture`, and the other wanted results of its render; a Blender that dies is restarted once."""
         return self.keeper.insist(partial(self._rendered, camera, is_open, clip, sweeping, wanted), self.named)
 
     @property
     def named(self) -> str:
-        """The name for error messages: the .blend file if it is the scene, else the models."""
+        """The name for error messages: the .blend file if it is the scene, otherwise the models."""
         blend = self.shot.scene.blend
         return ", ".join(sorted({p.model.key for p in self.things})) if blend is None else blend.file
 
@@ -362,15 +362,17 @@ class Arrangement:
         return kinds_of(self.things, self.meshes, self.shot.scene)
 
     def _levels(self, cameras: Sequence[Camera]) -> AllLevels | None:
-        """Halvings of the models' pictures for these cameras. None (no halving) with OpenGL, which has mip levels, in a user's
-        .blend scene, whose mirrors, lenses or compositor may magnify a picture, and with a script, whose materials stay.
+        """Halvings of the models' textures for these cameras; None for no halving.
+
+        None is used with OpenGL, which has mip levels; in a user's .blend scene, whose mirrors, lenses or compositor may
+        magnify a texture; and with a script, whose materials must not change.
         """
         if self.options.draws or self.shot.scene.blend is not None or self.options.script is not None:
             return None
         return tuple(kind.levels(cameras) for kind in self.kinds)
 
     def paint(self, process: BlenderProcess, levels: AllLevels, before: AllLevels | None) -> None:
-        """Rebuild the materials of the models whose pictures become finer or coarser."""
+        """Rebuild the materials of the models whose textures become finer or coarser."""
         changed = [i for i, level in enumerate(levels) if before is None or level != before[i]]
         looks = materials_request([self.kinds[i] for i in changed], process.put, [levels[i] for i in changed])
         process.ask("paint", STAGE_SECONDS, looks=[{"mesh": i, **look} for i, look in zip(changed, looks, strict=True)])
@@ -387,7 +389,9 @@ class Arrangement:
 
 
 def clip_of(visibility: Visibility, geometry: Geometry, camera: Camera) -> Clip:
-    """Clipping range, metres, of all visible surfaces; of the ground up to its corners, where Blender's ground ends."""
+    """Clipping range, in metres, of all visible surfaces; the ground is included up to its corners, where Blender's ground
+    ends.
+    """
     known = visibility.inverse_depth[visibility.inverse_depth > 0]
     if not len(known):
         return NEAREST, 1 / NEAREST
@@ -399,7 +403,7 @@ def clip_of(visibility: Visibility, geometry: Geometry, camera: Camera) -> Clip:
 
 
 def camera_request(camera: Camera, clip: Clip = (NEAREST, FARTHEST)) -> dict[str, Any]:
-    """A pinhole camera without skew as the worker's `render` takes it."""
+    """A pinhole camera without skew, in the form that the worker's `render` takes."""
     return {
         **{name: getattr(camera.intrinsics, name) for name in ("width", "height", "fx", "fy", "cx", "cy")},
         "R": camera.R.tolist(),
@@ -410,7 +414,7 @@ def camera_request(camera: Camera, clip: Clip = (NEAREST, FARTHEST)) -> dict[str
 
 
 def build_stage(shot: Shot, load: Load) -> CyclesStage:
-    """The stage of a shot; Blender builds the scene when the first picture is asked for.
+    """The stage of a shot; Blender builds the scene when the first picture is requested.
 
     Raises RecipeError for an option, or a ground, that its renderer does not have.
     """

@@ -1,11 +1,11 @@
-"""Reduces models' pictures to the resolution that a frame can show.
+"""The reduction of models' textures to the resolution that a frame can show.
 
-Cycles has no mip levels. Where many texels fall into one pixel, each look-up waits for memory (a tenth of a frame's time in
-all) and returns the noise of one texel instead of the mean. So a picture is halved, by means of 2 x 2 texels, as often as at
-least `FINEST` texels still lie in each pixel, along a line, at any place of the model and any rotation.
+Cycles has no mip levels. If many texels fall into one pixel, each look-up waits for memory (a tenth of a frame's time in total)
+and returns the noise of one texel instead of the mean. So a texture is halved, by means of 2 x 2 texels, while at least
+`FINEST` texels remain in each pixel, along a line, at any place of the model and any rotation.
 
-The number of halvings depends on the frame's own camera alone, so that a frame does not depend on those rendered before.
-Textures that cut out are never halved: labels see each texel.
+The number of halvings depends only on the frame's own camera, so a frame does not depend on those rendered before. Textures
+that cut out are never halved, because labels use each texel.
 """
 
 from __future__ import annotations
@@ -27,10 +27,10 @@ from viewsphere.model.sensors.camera import Camera
 from viewsphere.model.thing import Repaint, Thing
 
 FINEST = 2.0
-"""Fewest texels of a halved picture in a pixel, along a line."""
+"""Minimum texels of a halved texture in a pixel, along a line."""
 
 UNSEEN = 1.0
-"""Pixels that triangles with fewer than `FINEST` texels may cover in all: slivers, and triangles that the texture's coordinates
+"""Total pixels that triangles with fewer than `FINEST` texels may cover: slivers, and triangles that the texture's coordinates
 map to a line or a point.
 """
 
@@ -45,7 +45,7 @@ each of their bumps mirrors visibly.
 """
 
 MOST = 8
-"""Most halvings of a picture."""
+"""Maximum number of halvings of a texture."""
 
 BAND = 1 << MOST
 """Rows of a picture that are averaged at once, to limit memory."""
@@ -70,7 +70,7 @@ CONTENTS: Mapping[str, Content] = {
     "specular_texture": "data",
     "specular_color_texture": "color",
 }
-"""The textures that Cycles shows, and what their pictures hold."""
+"""The textures that Cycles shows, and the content of their images."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,7 +102,7 @@ class Density:
         return cls(texels[order], np.cumsum(area[order]))
 
     def halvings(self, pixels: float) -> int:
-        """Return the number of times the picture may be halved where a metre covers `pixels` pixels."""
+        """Return the number of times the texture may be halved if a metre covers `pixels` pixels."""
         if not len(self.texels) or not math.isfinite(pixels):
             return 0
         first = int(np.searchsorted(self.area * pixels**2, UNSEEN, side="right"))
@@ -158,7 +158,7 @@ class Kind:
         return tuple(self._material_levels(index, pixels) for index in range(len(self.mesh.materials)))
 
     def _pixels(self, camera: Camera) -> float:
-        """Most pixels of a pinhole's picture on a metre of the model, at any rotation; inf where the camera lies in the ball
+        """Maximum pixels of a pinhole's picture on a metre of the model, at any rotation; inf if the camera is inside a ball
         around a model.
         """
         middles, radius = self.balls
@@ -273,7 +273,7 @@ class Kind:
 
 
 def halved(pixels: NDArray[np.uint8], level: int, content: Content) -> NDArray[np.uint8]:
-    """Means of squares of 2^level texels: of light, of plain numbers, or directions; alpha is a plain number in any."""
+    """Means of squares of 2^level texels: of light, plain numbers, or directions; alpha is always a plain number."""
     out = np.empty((pixels.shape[0] >> level, pixels.shape[1] >> level, 4), np.uint8)
     out[..., 3] = _bytes(_means(pixels[..., 3], level, _plain)[..., 0])
     means = _means(pixels[..., :3], level, {"color": _light, "data": _plain, "normal": _directions}[content])
@@ -315,7 +315,7 @@ def _light(pixels: NDArray[np.uint8]) -> Float32:
 
 
 def _directions(pixels: NDArray[np.uint8]) -> Float32:
-    """Unit vectors of a normal map; texels without a direction, as between an atlas's islands, get the unbent normal."""
+    """Unit vectors of a normal map; texels without a direction, as between an atlas's islands, get the unperturbed normal."""
     v = pixels.astype(np.float32) * np.float32(2 / 255) - np.float32(1)
     v[..., 2] = np.maximum(v[..., 2], 0)
     length = np.sqrt((v * v).sum(axis=-1, keepdims=True))

@@ -1,4 +1,4 @@
-"""What the lenses share that bend lines: the box of their pictures of triangles, and helpers for their polynomials."""
+"""Functions shared by lenses that bend lines: the box of projected triangles, and helpers for polynomials."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from viewsphere.geometry.lenses import Bounds
 Float = NDArray[np.float64]
 
 KNOTS = 1024
-"""Steps, from its axis to its limit, of the table that says how much the lens bends lines."""
+"""Number of steps, from the axis to the limit, of the table of upper bounds on how much the lens bends lines."""
 
 RIM = 1 << 14
-"""Number of directions along a lens' limit at which its rim is searched."""
+"""Number of directions sampled along a lens' limit when its rim is searched."""
 
 
 class BentLens(NamedTuple):
-    """A lens as `kernels_bent` knows it: its coefficients, its limit (included) and its camera matrix."""
+    """A lens as `kernels_bent` uses it: its coefficients, its limit (inclusive) and its camera matrix."""
 
     is_fisheye: bool
     coefficients: tuple[float, ...]
@@ -32,7 +32,8 @@ class BentLens(NamedTuple):
 def bent_bounds(
     bent: BentLens, R: Float, t: Float, vertices: Float, is_used: NDArray[np.bool_], triangles: NDArray[np.int32]
 ) -> tuple[Bounds | None, bool]:
-    """As `viewsphere.geometry.lenses.Lens.bounds`, to 1e-5 px; triangles that cross the lens's limit are cut there."""
+    """The result of `viewsphere.geometry.lenses.Lens.bounds`, to 1e-5 px; triangles that cross the lens's limit are cut there.
+    """
     from viewsphere.geometry.lenses.shared import kernels_bent
 
     own = (bent.is_fisheye, bent.coefficients, bent.limit)
@@ -71,7 +72,7 @@ def _rim(fisheye: bool, k: tuple[float, ...], limit: float, skew: float) -> Floa
 def first_positive_root(polynomial: Float) -> float:
     """Smallest positive root of a polynomial (highest power first) whose constant term is 1; infinite if there is none.
 
-    Solved for 1/s, which keeps the leading coefficient at 1 however small the other coefficients are.
+    The polynomial is solved for 1/s, so the leading coefficient is 1 even if the others are tiny.
     """
     roots = np.roots(polynomial[::-1])
     real = roots.real[(np.abs(roots.imag) <= 1e-9 * np.abs(roots)) & (roots.real > 1e-12)]

@@ -1,11 +1,11 @@
 """The box of triangles seen through a distorted lens, which bends their edges.
 
-An edge is a line in the plane z = 1 (Brown-Conrady) or an arc of the unit sphere (fisheye). Where the second derivative of its
-picture by length is at most b, a piece of length L stays within b L^2 / 8 of the chord between its ends' pixels. So most edges
-cannot leave the box of the triangles' corners, and the few that can are halved until no piece can.
+An edge is a line in the plane z = 1 (Brown-Conrady) or an arc of the unit sphere (fisheye). If the second derivative of its
+picture by length is at most b, a piece of length L stays within b L^2 / 8 of the chord between the pixels of its ends. So most
+edges cannot leave the box of the triangles' corners, and the few that can are halved until no piece can.
 
-A lens is (is a fisheye, coefficients, limit, camera matrix, table): limit as in `BentLens`; table as `tabulate`
-fills it. A direction's distance from the axis is r/z for Brown-Conrady, an angle for a fisheye.
+A lens is (is a fisheye, coefficients, limit, camera matrix, table): limit as in `BentLens`; table as `tabulate` fills it. A
+direction's distance from the axis is r/z for Brown-Conrady, an angle for a fisheye.
 """
 
 from __future__ import annotations
@@ -17,12 +17,12 @@ import numpy as np
 from viewsphere.geometry.lenses.shared.kernels_lens import brown_conrady, radial_fisheye
 from viewsphere.kernels.jit import inner, njit
 
-TOLERANCE = 1e-5  # pixels by which a box may be too small, at most
-LONGEST = 1 << 14  # pieces of an edge, at most: only edges that reach pixels millions away from the image need as many
+TOLERANCE = 1e-5  # maximum error in pixels by which a box may be too small
+LONGEST = 1 << 14  # maximum pieces of an edge: only edges that reach pixels millions away from the image need this many
 HALVINGS = 60
 A, B, C, D, E, F = np.uintp(0), np.uintp(1), np.uintp(2), np.uintp(3), np.uintp(4), np.uintp(5)
-UNSURE = 1.02  # factor of the table's bends, since the table knows them at its knots only
-INNERMOST = 1e-3  # radians: nearer to the axis the terms of a fisheye's bend cancel each other
+UNSURE = 1.02  # safety factor for the table's bends, since the table holds them only at its knots
+INNERMOST = 1e-3  # radians: nearer to the axis, the terms of a fisheye's bend cancel
 
 
 @inner
@@ -71,7 +71,7 @@ def tabulate(fisheye, k, limit, table):
 
 @inner
 def _knot(lens, off):
-    """Index of the table's last knot that is not beyond `off` and not the table's last."""
+    """Index of the table's last knot, except the final one, that is not beyond `off`."""
     _, _, limit, _, table = lens
     last = table.shape[0] - 1
     return min(int(off / (1.0 + off) * ((1.0 + limit) / limit) * last), last - 1)
@@ -79,7 +79,9 @@ def _knot(lens, off):
 
 @inner
 def _look(lens, x, y, z):
-    """A direction scaled to z = 1 or to length 1, its distance from the axis (infinite where no lens sees), and its pixel."""
+    """A direction scaled to z = 1 or to length 1, its distance from the axis (infinite where the lens has no pixel), and its
+    pixel.
+    """
     fisheye, k, _, m, _ = lens
     r = math.sqrt(x * x + y * y)
     length = math.sqrt(r * r + z * z)
@@ -112,7 +114,7 @@ def _grown(box, u, v):
 
 @inner
 def _length(lens, a, b):
-    """Squared length of the line or arc between two directions; an arc's length is bounded by means of its chord."""
+    """Squared length of the line or arc between two directions; the length of an arc is bounded by its chord."""
     x, y, z = a[0] - b[0], a[1] - b[1], a[2] - b[2]
     square = x * x + y * y + z * z
     return square * (1.0 + 0.143 * square) ** 2 if lens[0] else square
@@ -120,14 +122,14 @@ def _length(lens, a, b):
 
 @inner
 def _farthest(lens, a, b, square):
-    """Upper bound of the distance from the axis between two directions: only arcs behind the camera exceed their ends."""
+    """Upper bound of the distance from the axis between two directions; only arcs behind the camera exceed their ends."""
     off = max(a[3], b[3])
     return off + 0.5 * math.sqrt(square) if lens[0] and off > 0.5 * math.pi else off
 
 
 @inner
 def _may_leave(lens, box, a, b, bend, square):
-    """Return whether the picture between two directions may leave the box, if it bends at most by `bend`."""
+    """Return whether the picture between two directions may leave the box if it bends by at most `bend`."""
     m, out = lens[3], 0.125 * square * bend
     along_u = out * math.sqrt(m[0, 0] * m[0, 0] + m[0, 1] * m[0, 1]) - TOLERANCE
     along_v = out * m[1, 1] - TOLERANCE
@@ -141,7 +143,7 @@ def _may_leave(lens, box, a, b, bend, square):
 
 @inner
 def _followed(lens, box, a, b):
-    """The box grown by an edge that the lens sees entirely: piece i of 2^level is halved as long as it may leave the box."""
+    """The box grown by an edge that the lens sees entirely; piece i of 2^level is halved while it may leave the box."""
     level, i = 0, 0
     for _ in range(LONGEST):
         step = 0.5**level
@@ -163,7 +165,9 @@ def _followed(lens, box, a, b):
 
 @inner
 def _cut(lens, box, inside, outside):
-    """The box grown by the part of an edge from the end that the lens sees to where the edge leaves the lens' field."""
+    """The box grown by the visible part of an edge, from the end that the lens sees to the point where it leaves the lens'
+    field.
+    """
     low, high = 0.0, 1.0
     for _ in range(HALVINGS):
         middle = 0.5 * (low + high)
@@ -209,7 +213,7 @@ def _volume(a, b, c):
 
 @inner
 def _holds(a, b, c, d):
-    """Return whether the ray in direction d meets the triangle a, b, c."""
+    """Return whether the ray in direction d hits the triangle a, b, c."""
     whole, x, y, z = _volume(a, b, c), _volume(d, b, c), _volume(a, d, c), _volume(a, b, d)
     return (whole > 0.0 and x >= 0.0 and y >= 0.0 and z >= 0.0) or (whole < 0.0 and x <= 0.0 and y <= 0.0 and z <= 0.0)
 
@@ -237,7 +241,9 @@ def _edges(lens, box, corners):
 
 @njit
 def look(vertices, is_used, base, r, t, lens, points):
-    """Fill points (n, 6) with `_look` of the used vertices from `base` on; returns their box, and whether all are seen."""
+    """Fill points (n, 6) with `_look` of the used vertices from `base` on; return their box, and whether all of them are
+    visible.
+    """
     box, whole = (np.inf, np.inf, -np.inf, -np.inf), True
     for j in range(points.shape[0]):
         if not is_used[j]:
@@ -260,7 +266,7 @@ def look(vertices, is_used, base, r, t, lens, points):
 
 @inner
 def _rimmed(lens, box, a, b, c, rim):
-    """The box grown by the directions of a lens' rim that lie in a triangle."""
+    """The box grown by the directions of a lens' rim that are inside a triangle."""
     for i in range(rim.shape[0]):
         d = rim[i, 0], rim[i, 1], rim[i, 2]
         if _holds(a, b, c, d):
@@ -271,10 +277,12 @@ def _rimmed(lens, box, a, b, c, rim):
 
 @njit
 def bent_bounds(vertices, is_used, base, triangles, first, last, r, t, lens, rim, points):
-    """Bounds (u0, v0, u1, v1) in pixels of what a lens sees of triangles [first, last), and whether it sees all of them.
+    """Bounds (u0, v0, u1, v1) in pixels of the parts of triangles [first, last) that a lens sees, and whether it sees all of
+    them.
 
     The triangles' corners are vertices [base, base + n), of which some are used; points (n, 6) is scratch. `rim` (M, 3) are the
-    directions at the lens' limit where its picture turns back along u or v. (inf, inf, -inf, -inf) where nothing is seen.
+    directions at the lens' limit where its picture turns back along u or v. The bounds are (inf, inf, -inf, -inf) if nothing is
+    visible.
     """
     box, whole = look(vertices, is_used, base, r, t, lens, points)
     for f in range(np.uintp(first), np.uintp(last)):

@@ -111,7 +111,7 @@ def undistort_brown(k, limit, u, v):
                 break
             step *= 0.5
         if step <= 1e-9:
-            small = du * du + dv * dv <= (1e-13 * (1.0 + target)) ** 2  # at the rounding floor no step brings it closer
+            small = du * du + dv * dv <= (1e-13 * (1.0 + target)) ** 2  # at the rounding floor, no step improves the result
             return (x, y) if small else (np.nan, np.nan)
         x, y = nx, ny
     return np.nan, np.nan
@@ -135,7 +135,7 @@ def rays_fisheye(k, limit, matrix, xy, out):
 
 @njit
 def elevation_at(k, y):
-    """Elevation, radians, at row y of a scan; k: the azimuth of its middle, then the elevations of its rings."""
+    """Elevation, in radians, at row y of a scan; k holds the azimuth of the scan's middle, then the elevations of its rings."""
     count = k.shape[0] - 1
     row = y - 0.5
     ring = int(min(max(math.floor(row), 0.0), count - 1.0))
@@ -145,7 +145,7 @@ def elevation_at(k, y):
 
 @njit
 def row_of(k, elevation):
-    """The row of a scan at which an elevation is: the inverse of `elevation_at`."""
+    """The row of a scan at this elevation: the inverse of `elevation_at`."""
     low, high = 0, k.shape[0] - 3  # the ring above the elevation, unless it is above or below all of them
     while low < high:
         middle = (low + high + 1) // 2
@@ -158,7 +158,7 @@ def row_of(k, elevation):
 
 @njit
 def scan_ray(k, u, v):
-    """Unit ray at azimuth u from a scan's middle and row v; NaN beyond a whole turn, and beyond straight up and down."""
+    """Unit ray at azimuth u from a scan's middle and row v; NaN beyond a full turn, and beyond straight up and down."""
     elevation = elevation_at(k, v)
     if abs(u) > math.pi or abs(elevation) > 0.5 * math.pi:
         return np.nan, np.nan, np.nan
@@ -168,7 +168,7 @@ def scan_ray(k, u, v):
 
 @njit
 def rays_scan(k, matrix, xy, out):
-    """Unit rays through positions xy (N, 2); NaN beyond a whole turn around the middle, and beyond straight up and down."""
+    """Unit rays through positions xy (N, 2); NaN beyond a full turn around the middle, and beyond straight up and down."""
     for i in range(xy.shape[0]):
         v = (xy[i, 1] - matrix[1, 2]) / matrix[1, 1]
         u = (xy[i, 0] - matrix[0, 2] - matrix[0, 1] * v) / matrix[0, 0]

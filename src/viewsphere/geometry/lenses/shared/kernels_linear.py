@@ -11,11 +11,11 @@ U = np.uintp
 
 @njit(_nrt=True)
 def cut_bounds(vertices, triangles, first, last, base, stop, k, r, t, near):
-    """Bounds (u0, v0, u1, v1) in pixels of the part with w >= near of triangles [first, last), and whether this
-    part is all of them.
+    """Bounds (u0, v0, u1, v1) in pixels of the part with w >= near of triangles [first, last), and whether all of them have w
+    >= near.
 
-    Their corners are vertices [base, stop). Triangles that cross the plane w = near are cut there. (inf,
-    inf, -inf, -inf) where nothing is in front of that plane.
+    The corners are vertices [base, stop). Triangles that cross the plane w = near are cut there. The bounds are (inf, inf,
+    -inf, -inf) if nothing is in front of that plane.
     """
     u0, v0, u1, v1 = np.inf, np.inf, -np.inf, -np.inf
     whole, front = True, True
@@ -56,8 +56,8 @@ def cut_bounds(vertices, triangles, first, last, base, stop, k, r, t, near):
 
 @njit
 def whole_bounds(vertices, used, base, k, r, t, near):
-    """Bounds (u0, v0, u1, v1) in pixels of the `used` (n,) vertices from `base` on, and whether all of these have w >= near:
-    else the bounds are arbitrary.
+    """Bounds (u0, v0, u1, v1) in pixels of the `used` (n,) vertices from `base` on, and whether all of them have w >= near. If
+    not, the bounds are arbitrary.
     """
     u0, v0, u1, v1, front = np.inf, np.inf, -np.inf, -np.inf, True
     for j in range(U(used.shape[0])):

@@ -1,6 +1,6 @@
 """The box of a projected model in a LiDAR's scan, whose columns are azimuths and whose rows are elevations.
 
-Along an edge, an arc of the unit sphere, the azimuth only rises or falls, and the elevation has its extreme at an end or where
+Along an edge, which is an arc of the unit sphere, the azimuth is monotonic. The elevation has its extreme at an end, or where
 the arc is level.
 """
 
@@ -16,7 +16,7 @@ from viewsphere.kernels.jit import inner, njit
 
 @inner
 def _steepest(a, b, lowest, highest):
-    """The elevations grown by those between two directions."""
+    """The range of elevations grown by those between two directions."""
     nx, ny, nz = a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
     steepest = math.atan2(math.sqrt(nx * nx + nz * nz), abs(ny))  # of the circle that the arc is a part of
     if steepest <= highest and -steepest >= lowest:
@@ -33,7 +33,7 @@ def _steepest(a, b, lowest, highest):
 
 @inner
 def _is_above(a, b, c):
-    """Return whether the plane of a triangle passes above the centre, not below."""
+    """Return whether the plane of a triangle passes above the centre rather than below it."""
     ux, uy, uz = b[0] - a[0], b[1] - a[1], b[2] - a[2]
     vx, vy, vz = c[0] - a[0], c[1] - a[1], c[2] - a[2]
     nx, ny, nz = uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
@@ -42,8 +42,10 @@ def _is_above(a, b, c):
 
 @njit
 def bounds(vertices, is_used, triangles, r, t, k, room):
-    """Azimuths from the scan's middle, radians, and rows (u0, v0, u1, v1) of triangles (n, 3) of vertices (v, 3), of which some
-    are used; k as in `kernels_lens.elevation_at`. room (v, 5) is scratch. A whole turn where an edge passes behind the middle.
+    """Azimuths from the scan's middle, in radians, and rows (u0, v0, u1, v1) of triangles (n, 3).
+
+    The corners are vertices (v, 3), of which some are used; k as in `kernels_lens.elevation_at`; room (v, 5) is scratch. The
+    azimuths span a full turn if an edge passes behind the middle.
     """
     left, right, lowest, highest = np.inf, -np.inf, np.inf, -np.inf
     for i in range(vertices.shape[0]):

@@ -1,4 +1,4 @@
-"""The box of triangles seen through any lens, found by projecting points of their edges: for lenses without `bounds`."""
+"""The box of triangles seen through any lens, for lenses without `bounds`: found by projecting points of the edges."""
 
 from __future__ import annotations
 
@@ -12,20 +12,20 @@ Flags = NDArray[np.bool_]
 Bounds = tuple[float, float, float, float]
 
 TOLERANCE = 1e-4
-"""Pixels that an edge may bend beyond the box before it is halved: ten times finer than box2d_projected's proof needs."""
+"""Pixels by which an edge may exceed the box before it is halved: ten times finer than box2d_projected's proof needs."""
 
 HALVINGS = 40
-"""Halvings of an edge that the lens shows in part: its end is then known to 1e-12 of its length."""
+"""Number of halvings of an edge that the lens shows in part; they locate its visible end to 1e-12 of its length."""
 
 FEWEST = 4
-"""Halvings of every edge: a sixteenth of an edge that no lens bends back and forth."""
+"""Minimum number of halvings of an edge, into sixteenths; no lens bends a piece this short back and forth."""
 
 MOST = 1 << 16
-"""Triangles and rim directions that are compared at once."""
+"""Maximum number of combinations of triangles and rim directions that are compared at once."""
 
 
 class Shows(Protocol):
-    """What the search asks of a `viewsphere.geometry.lenses.Lens`."""
+    """The parts of `viewsphere.geometry.lenses.Lens` that the search uses."""
 
     @property
     def has_unit_rays(self) -> bool: ...  # noqa: D102
@@ -36,9 +36,10 @@ class Shows(Protocol):
 def bounds(
     lens: Shows, R: Float, t: Float, vertices: Float, is_used: Flags, triangles: NDArray[np.int32]
 ) -> tuple[Bounds | None, bool]:
-    """As `viewsphere.geometry.lenses.Lens.bounds`. Edges are halved until they cannot leave the box. Where the lens shows a
-    triangle in part, or a triangle may surround the direction behind the camera, the box also holds what the picture's
-    outermost pixels show of it.
+    """The result of `viewsphere.geometry.lenses.Lens.bounds`.
+
+    Edges are halved until they cannot leave the box. If the lens shows a triangle in part, or a triangle may surround the
+    direction behind the camera, the box also includes the outermost pixels that show it.
     """
     points = vertices @ R.T + t
     corners, shown = lens.project(points)
@@ -60,7 +61,7 @@ def _grown(box: Bounds, pixels: Float) -> Bounds:
 
 
 def _followed(lens: Shows, box: Bounds, ends: Float, pixels: Float) -> tuple[Bounds, bool]:
-    """The box grown by edges (n, 2, 3), whose ends' positions are known, and whether the lens shows all of them."""
+    """The box grown by edges (n, 2, 3) whose ends have the given positions, and whether the lens shows all of them."""
     whole = True
     for depth in range(HALVINGS):
         middle = ends.mean(axis=1)
@@ -85,8 +86,8 @@ def _followed(lens: Shows, box: Bounds, ends: Float, pixels: Float) -> tuple[Bou
 
 
 def _rim_inside(lens: Shows, triangles: Float) -> Float:
-    """The positions of the outermost pixels that have a ray, of each row and each column, whose rays meet one of the triangles
-    (n, 3, 3) in camera axes.
+    """The positions, in each row and column, of the outermost pixels with a ray whose rays hit one of the triangles (n, 3, 3)
+    in camera axes.
     """
     directions = lens.directions()
     has_ray: Flags = ~np.isnan(directions[..., 0])

@@ -1,7 +1,6 @@
-"""The gathering of light where probes are too coarse.
+"""The gathering of light on surfaces for which probes are too coarse.
 
-Light is gathered at the nodes of lightmaps, at sites on surfaces that are not flat, and at patches without a part in the
-lightmaps.
+Light is gathered at the nodes of lightmaps, at sites on surfaces that are not flat, and at patches outside the lightmaps.
 """
 
 from __future__ import annotations
@@ -23,15 +22,15 @@ from viewsphere.engines.raster.reflections.tracing import Tree, cast
 from viewsphere.engines.raster.sky.environment import Surrounding, sky_along
 
 NODE_RAYS, SITE_RAYS = 256, 128
-"""Of a node of the lightmap, and of a site."""
+"""Number of rays of a node of the lightmap, and of a site."""
 
 FINER = 4
-"""As many times more rays where light is fine: walls are blotchy by 2 of 255 with fewer."""
+"""Factor by which fine light uses more rays: with fewer, walls are blotchy by 2 of 255."""
 
 
 class Spots(NamedTuple):
-    """Places that gather light: their rays, local (R, K, 3) in axes (W, 3, 3), see `kernels_lightmap`, and how much each of
-    them counts, (N,).
+    """Places that gather light: their rays, local (R, K, 3) in axes (W, 3, 3), see `kernels_lightmap`, and the weight of each
+    place, (N,).
     """
 
     rays: Rays
@@ -50,7 +49,9 @@ class Spots(NamedTuple):
         cell: float,
         is_inside_out: bool,
     ) -> Spots:
-        """Cast rays from origins (N, 3) in these ways: directions and turns. normals (T, 3): of the tree's triangles."""
+        """The result of casting rays from origins (N, 3) in these ways: directions and turns. normals (T, 3): those of the
+        tree's triangles.
+        """
         met, far = cast(tree, origins, *ways, np.inf)
         counted = np.empty(len(origins), np.float32)
         kernels.count_in(met, far, *ways, normals, np.float32(cell), is_inside_out, counted)
@@ -80,13 +81,13 @@ class Spots(NamedTuple):
         return light
 
     def receive(self, ids: Int32, sent: Float32, far: Float32, nodes: Float32) -> None:
-        """Set nodes (N, COLUMNS) to what patches send, (M, 3), and what comes from far away."""
+        """Set nodes (N, COLUMNS) to the light that patches send, (M, 3), plus the light from far away."""
         nodes[:] = far
         kernels.receive(ids, self.rays.turn, self.local, sent, self.counted, nodes)
 
 
 def _sky(surrounding: Surrounding, rays: Rays, ids: Int32) -> Float32:
-    """The sky's light along directions (W, K, 3), as far as any ray meets it."""
+    """The sky's light along directions (W, K, 3), computed only for directions in which some ray reaches it."""
     is_seen = np.zeros(rays.directions.shape[:2], np.bool_)
     k, i = np.nonzero(ids == SKY)
     is_seen[rays.turn[i], k] = True
@@ -96,7 +97,7 @@ def _sky(surrounding: Surrounding, rays: Rays, ids: Int32) -> Float32:
 
 
 class Round(NamedTuple):
-    """Sites on the triangles that no chart knows, these triangles, and the sites' rays."""
+    """Sites on the triangles without a chart, these triangles, and the sites' rays."""
 
     sites: Sites
     facets: Facets
@@ -104,7 +105,9 @@ class Round(NamedTuple):
 
 
 class Look(NamedTuple):
-    """The parts of the gathering that depend on no light: of flat surfaces, and of all others, None if there are no others."""
+    """The parts of the gathering that do not depend on light: for flat surfaces, and for all others, None if there are no
+    others.
+    """
 
     charts: Charts
     nodes: Spots
@@ -116,7 +119,7 @@ class Look(NamedTuple):
         return [self.nodes.rays, *([self.round.spots.rays] if self.round else [])]
 
     def alone(self, patches: Patches) -> Int32:
-        """The patches whose light no chart knows."""
+        """The patches that no chart lights."""
         chart = np.where(patches.triangles >= 0, self.charts.chart[patches.triangles], -1)
         normals = self.charts.charts[chart, kernels.NORMAL : kernels.NORMAL + 3]
         is_mapped = (chart >= 0) & ((normals * patches.normals).sum(axis=1) >= kernels.FACING)
@@ -156,8 +159,8 @@ def look(
 
 
 class FinalGather(NamedTuple):
-    """ids: of the rays of nodes, of sites, and of patches, the patches that they hit; afar: what comes to them from the sky,
-    the ground far away, and emissive triangles.
+    """ids: for the rays of nodes, of sites, and of patches, the patches that they hit. afar: the light that reaches them from
+    the sky, the distant ground, and emissive triangles.
     """
 
     look: Look
@@ -179,7 +182,7 @@ class FinalGather(NamedTuple):
         emitted: Float32,
         off: float,
     ) -> FinalGather:
-        """Of patches that send `emitted` (M, 3) by themselves; the last bundles of their rays are those of look and around."""
+        """The gathering for patches that emit `emitted` (M, 3); the last bundles of their rays are those of look and around."""
         spots = [look.nodes, *([look.round.spots] if look.round else [])]
         ids, given = patches.ids[-len(spots) - 1 :], (surrounding, tree, emissive, turns, emitted, off)
         afar = [own.from_afar(which, *given) for own, which in zip(spots, ids[:-1], strict=True)]
@@ -193,15 +196,17 @@ class FinalGather(NamedTuple):
         return cls(look, around, ids, lightmap, (*afar, around.from_afar(ids[-1], *given)))
 
     def receive(self, sent: Float32) -> None:
-        """Gather what patches send, (M, 3), at the nodes of the lightmaps."""
+        """Gather the light that patches send, (M, 3), at the nodes of the lightmaps."""
         self.look.nodes.receive(self.ids[0], sent, self.afar[0], self.lightmap.nodes)
 
     def look_around(self, sent: Float32, glow: Float32, inside: Float32) -> None:
-        """Set glow (M, 3) and inside (M,) of the patches that have no part in the lightmaps: see `kernels_probes.look_up`."""
+        """Set glow (M, 3) and inside (M,) of the patches outside the lightmaps: see `kernels_probes.look_up`."""
         send_around(self.ids[-1], self.around.which, self.around.share, self.afar[-1], sent, glow, inside)
 
     def finish(self, sent: Float32) -> None:
-        """Mix what neighbouring nodes know, which have received what patches send, (M, 3), and gather it at all sites."""
+        """Mix the values of neighbouring nodes, which have received the light of patches, (M, 3), and gather this light at all
+        sites.
+        """
         kernels.smooth(self.lightmap.charts, self.lightmap.nodes.copy(), self.lightmap.nodes)
         if self.look.round:
             sites, facets, spots = self.look.round

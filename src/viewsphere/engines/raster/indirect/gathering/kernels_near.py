@@ -1,4 +1,4 @@
-"""Light of what is near the samples of a picture, from the patches that short rays hit: see `near_field_gather`."""
+"""Light of surfaces near the samples of a picture, from the patches that short rays hit: see `near_field_gather`."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ U = nb.uintp
 
 @njit(fastmath=FAST)
 def gather(met, far, origins, ways, which, normals, sent, slots, near):
-    """Set rows `slots` (N,) of near (S, 4): the share of rays that meet nothing, and the mean light of what the others meet.
+    """Set rows `slots` (N,) of near (S, 4): the share of rays without a hit, and the mean light of the others' hits.
 
-    met, far (K, N), origins (N, 3): see `kernels_trace.cast`; ways (N, K, 3); which (T,): which of the triangles with these
-    normals are met; sent: see `PatchLight`. A ray that meets no known patch,
-    or an emissive triangle, counts as one that meets nothing.
+    met, far (K, N), origins (N, 3): see `kernels_trace.cast`; ways (N, K, 3); which (T,): numbers, among the triangles with
+    these normals, of the triangles that rays can hit; sent: see `PatchLight`. A ray that hits no known patch, or an emissive
+    triangle, counts as a ray without a hit.
     """
     per, cells = f4(1) / f4(met.shape[0]), sent.frame[6]
     for i in range(U(met.shape[1])):

@@ -1,8 +1,8 @@
-"""The near surfaces that probes miss: each sample of a picture gathers them with short rays (`bounces: fine`).
+"""The nearby surfaces that probes miss: each sample of a picture gathers their light with short rays (`bounces: fine`).
 
-The last bounce of light is followed from the picture itself (final gathering, Reichert 1992), about as far as probes are
-apart. So leaves shade leaves, and an awning the shop below it. A surface that a ray meets sends the light of its patch;
-where a ray meets nothing, the probes' light arrives.
+The last bounce of light is traced from the picture itself (final gathering, Reichert 1992), over about the distance between
+probes. So leaves shade leaves, and an awning shades the shop below it. A surface that a ray hits sends the light of its patch;
+a ray without a hit receives the probes' light.
 """
 
 from __future__ import annotations
@@ -17,24 +17,24 @@ from viewsphere.engines.raster.records import NO_NEAR, Bounces, Float32, Int32, 
 from viewsphere.engines.raster.reflections.tracing import Tree, cast
 
 REACH = 2.0
-"""Cells of the finest probes up to which rays go."""
+"""Length of the rays, in cells of the finest probes."""
 
 RAYS, TILE = 32, 8
-"""Of a sample; pixels after which they are turned the same way again."""
+"""Number of rays of a sample; size in pixels of the tile after which their rotations repeat."""
 
 OFF = 5e-4
 """Metres off the surface at which rays begin."""
 
 SOME = 1 << 14
-"""Samples at a time: each takes some 1,000 bytes."""
+"""Number of samples processed at a time: each takes about 1,000 bytes."""
 
 
 def with_near(
     bounces: Bounces, bounce_scene: BounceScene, tree: Tree, view: PictureRays, slots: Int32, triangle: Int32, depth: Float32
 ) -> Bounces:
-    """The same with `Bounces.near` of the samples `slots` (N,) that show the bounce scene's triangles and have no lightmap.
+    """The bounces with `Bounces.near` for the samples `slots` (N,) that show the bounce scene's triangles and have no lightmap.
 
-    triangle, depth (S,): what samples show, see `kernels_paint.shade`.
+    triangle, depth (S,): the data of samples, see `kernels_paint.shade`.
     """
     slots = slots[bounce_scene.owns[triangle[slots]]]
     if len(bounces.lightmap.chart):
@@ -58,7 +58,7 @@ def with_near(
 
 
 def _turn(view: PictureRays, slots: Int32) -> Int32:
-    """Return the turn of each sample's rays; a tile of pixels has all turns."""
+    """Return the rotation of each sample's rays; a tile of pixels has all rotations."""
     if len(view.places):
         return slots % (TILE * TILE)
     row, column = np.divmod(slots, np.int32(view.columns))

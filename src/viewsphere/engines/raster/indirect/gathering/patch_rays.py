@@ -1,4 +1,4 @@
-"""Rays of patches whose light no lightmap knows: probes between small things are too coarse for what these throw back."""
+"""Rays of patches that no lightmap lights: probes between small things are too coarse for the light that these reflect."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ from viewsphere.engines.raster.reflections.tracing import Tree, cast
 from viewsphere.engines.raster.sky.environment import Surrounding, sky_along
 
 RAYS = 8
-"""Of each known hit of a patch."""
+"""Number of rays from each stored hit of a patch."""
 
 WAYS = 32
-"""In which rays of hits are turned."""
+"""Number of rotations of the rays of hits."""
 
 SOME = 4096
-"""Hits at a time."""
+"""Number of hits processed at a time."""
 
 
 class PatchRays(NamedTuple):
@@ -45,8 +45,8 @@ class PatchRays(NamedTuple):
     ) -> Float32:
         """Return the light of the sky, the distant ground and emissive triangles at these origins, (N, 3).
 
-        The light is radiance of white matt surfaces. The rays of the origins hit patches `ids` (K, N). Emissive triangles send
-        `emitted` (M, 3).
+        The light is given as the radiance of white matt surfaces. The rays of the origins hit patches `ids` (K, N). Emissive
+        triangles send `emitted` (M, 3).
         """
         light = np.zeros((len(self.which), 3), np.float32)
         for start in range(0, len(light), SOME):
@@ -60,8 +60,10 @@ class PatchRays(NamedTuple):
 
 
 def rays_of(patches: Patches, which: Int32, dome: Float32, tree: Tree, off: float) -> PatchRays:
-    """Rays from some patches in directions as dense as their cosine, `dome` (RAYS * WAYS, 3): from their hits, `off` the
-    surface, as the mean of several places on a round thing lies within the thing.
+    """Rays from some patches in directions distributed by their cosine, `dome` (RAYS * WAYS, 3).
+
+    They begin at the patches' hits, `off` the surface, because the mean of several places on a round thing is inside that
+    thing.
     """
     table = patches.table
     rows, columns = np.nonzero(np.arange(kernels.HITS) < table.known[which, None])
@@ -76,7 +78,7 @@ def rays_of(patches: Patches, which: Int32, dome: Float32, tree: Tree, off: floa
 
 
 def axes_along(normals: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Axes (N, 3, 3) whose last is the normal (Duff et al., Building an Orthonormal Basis, Revisited, 2017)."""
+    """Axes (N, 3, 3) whose last one is the normal (Duff et al., Building an Orthonormal Basis, Revisited, 2017)."""
     x, y, z = normals.T
     sign = np.where(z < 0, np.float32(-1), np.float32(1))
     a = -1 / (sign + z)
