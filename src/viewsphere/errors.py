@@ -1,7 +1,7 @@
-"""Everything viewsphere raises on purpose.
+"""The exceptions that viewsphere raises on purpose.
 
     ViewsphereError
-    ├── UserError                 the user can mend it: one line, exit status 2
+    ├── UserError                 the user can fix it: one line, exit status 2
     │   ├── RecipeError           a recipe's field, with file and line
     │   ├── ModelError            a model file that cannot be used
     │   ├── StoreError            an output folder that cannot be used
@@ -9,12 +9,12 @@
     │   ├── PluginError           a plug-in that cannot be loaded, or whose spec is not valid
     │   └── MissingExtraError     a feature whose optional package is not installed
     ├── CheckFailedError          a data set that is not what it claims to be: exit status 1
-    ├── WorkerDied                who did a job died, as often as it is tried; other jobs go on
-    ├── BlenderError              Blender answered that it cannot; it lives, and can be asked again
-    └── BlenderDied               Blender crashed, or hung and was ended; only another one can be asked
+    ├── WorkerDied                a job's process died in every try; other jobs go on
+    ├── BlenderError              Blender reported that a request failed; it still runs
+    └── BlenderDied               Blender crashed, or hung and was killed
 
-A message says where, what was expected, what was found and what to do, in one line; mistakes that are told together have a
-line each.
+A message states the place, the expected value, the value found and the fix, in one line. Errors reported together have one line
+each.
 """
 
 from __future__ import annotations
@@ -26,19 +26,19 @@ Item = TypeVar("Item")
 Made = TypeVar("Made")
 
 MOST_TOLD = 20
-"""Mistakes that are told together; of further ones the number is."""
+"""Maximum number of errors reported together; further ones are only counted."""
 
 
 class ViewsphereError(Exception):
-    """Anything that viewsphere raises on purpose."""
+    """The base class of all exceptions that viewsphere raises on purpose."""
 
 
 class UserError(ViewsphereError):
-    """A mistake the user can mend; the command line shows it in one line and exits with status 2."""
+    """An error the user can fix; the command line shows it in one line and exits with status 2."""
 
 
 class RecipeError(UserError):
-    """A recipe that does not say something that can be done."""
+    """An invalid recipe."""
 
 
 class ModelError(UserError):
@@ -50,7 +50,7 @@ class StoreError(UserError):
 
 
 class RemoteError(UserError):
-    """A URL that does not answer, or refuses; what is finished there is kept."""
+    """A URL that does not answer, or refuses; results already finished there are kept."""
 
 
 class PluginError(UserError):
@@ -70,8 +70,8 @@ class WorkerDied(ViewsphereError):
 
 
 class BlenderError(ViewsphereError):
-    """Blender answered that it cannot do what it was asked; it lives, and can be asked again. `reason` is the message without
-    the name of Blender's exception, `how` the whole one.
+    """Blender reported that a request failed; it still runs and accepts further requests. `reason` is the message without the
+    name of Blender's exception, `how` the full message.
     """
 
     def __init__(self, message: str) -> None:
@@ -80,10 +80,10 @@ class BlenderError(ViewsphereError):
 
 
 class BlenderDied(ViewsphereError):
-    """Blender crashed, or hung and was ended; only another one can be asked.
+    """Blender crashed, or hung and was killed; further requests need a new Blender process.
 
-    `how` is the message without the end of Blender's log. `signal` names the signal that ended it, such as SIGKILL; None where
-    there was none, or it hung. `is_late`: it was ended because it hung.
+    `how` is the message without the end of Blender's log. `signal` names the signal that ended it, such as SIGKILL; None if
+    there was none or Blender hung. `is_late`: Blender was killed because it hung.
     """
 
     def __init__(self, how: str, signal: str | None = None, *, log: str = "", is_late: bool = False) -> None:
@@ -92,11 +92,11 @@ class BlenderDied(ViewsphereError):
 
 
 class NotKeptError(AttributeError):
-    """An object lacks a field, or its data set does not keep it."""
+    """A field that an object lacks or its data set does not store."""
 
 
 def joined(errors: Sequence[ViewsphereError]) -> ViewsphereError:
-    """Join errors to one, each line once; of their common type if they have one, else a UserError."""
+    """Join errors into one, with each line once. It has their common type if there is one, else UserError."""
     kinds = {type(error) for error in errors}
     kind = kinds.pop() if len(kinds) == 1 else UserError
     lines = list(dict.fromkeys(line for error in errors for line in str(error).splitlines()))
@@ -105,7 +105,7 @@ def joined(errors: Sequence[ViewsphereError]) -> ViewsphereError:
 
 
 def each(work: Callable[[Item], Made], items: Iterable[Item]) -> list[Made]:
-    """Return the result of `work` for each item, in order; raises all of the user's mistakes together, as `joined` does."""
+    """Return the result of `work` for each item, in order; raises all UserErrors together, as `joined` does."""
     made, errors = list[Made](), list[UserError]()
     for item in items:
         try:

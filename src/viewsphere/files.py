@@ -1,7 +1,7 @@
-"""The one way in which files are opened for reading: regular files only, each up to a named limit.
+"""The functions that open all files for reading: regular files only, each up to a named limit.
 
-Files that a recipe or a stranger names may be pipes, devices or endless. `read_bytes`, `read_text`, `open_file` and `open_text`
-refuse them, also where a file grows while it is read. `check_file` looks at a file that a library opens by its path.
+Files named by a recipe or an untrusted source may be pipes, devices or endless. `read_bytes`, `read_text`, `open_file` and
+`open_text` refuse them, even if a file grows while it is read. `check_file` checks a file that a library opens by its path.
 """
 
 from __future__ import annotations
@@ -18,7 +18,9 @@ from viewsphere.errors import UserError
 from viewsphere.limits import limits
 
 BLOCK = 1 << 20
-"""Bytes that are read at once beyond the size that a file claims: small beside any limit, large beside a call's cost."""
+"""Bytes read at once beyond the size that a file reports: small compared to any limit, large enough to make a call's cost
+negligible.
+"""
 
 FLAGS = sum(getattr(os, name, 0) for name in ("O_NONBLOCK", "O_NOCTTY"))
 """Further flags of opening: without O_NONBLOCK a pipe that nothing writes to blocks for ever."""
@@ -32,11 +34,11 @@ KINDS: Mapping[int, str] = {
     S_IFSOCK: f"a socket, {COPY}",
     S_IFDIR: "a folder, not a file. Name a file in it",
 }
-"""Kinds of files that are not regular, and the remedy."""
+"""Kinds of files that are not regular, and the fix that messages suggest."""
 
 
 class FileError(UserError, OSError):
-    """A file that is not regular, or larger than its limit; `strerror` is the message behind "is"."""
+    """A file that is not regular, or larger than its limit; `strerror` is the part of the message after "is"."""
 
     def __init__(self, file: str, problem: str) -> None:
         super().__init__(file, problem)
@@ -55,7 +57,7 @@ def read_bytes(file: Path, limit: str = "MAX_FILE_BYTES") -> bytes:
     with _Bounded(file, limit) as stream:
         size = os.fstat(stream.fileno()).st_size
         first = stream.read(size + 1)
-        return first if len(first) <= size else first + stream.readall()  # it grew, or is of those whose size is told as 0
+        return first if len(first) <= size else first + stream.readall()  # it grew, or its size is reported as 0
 
 
 def read_text(file: Path, limit: str = "MAX_FILE_BYTES", encoding: str = "utf-8") -> str:
@@ -86,7 +88,7 @@ class _Bounded(io.FileIO):
     """A regular file on a disk of which at most limit + 1 bytes are read."""
 
     def __init__(self, file: Path, limit: str) -> None:
-        super().__init__(str(file), "rb", opener=_descriptor)  # libraries take a stream's name for a text
+        super().__init__(str(file), "rb", opener=_descriptor)  # libraries expect a stream's name to be a string
         self._file, self._limit, self._most = str(file), limit, int(getattr(limits, limit))
         try:
             _refuse_larger(self._file, os.fstat(self.fileno()).st_size, limit)
@@ -106,7 +108,7 @@ class _Bounded(io.FileIO):
         return b"".join(iter(lambda: self.read(BLOCK), b""))
 
     def readinto(self, buffer: Any, /) -> int:
-        """The number of bytes that are put into the buffer; raises FileError beyond the limit."""
+        """Read into the buffer, and return the number of bytes; raises FileError beyond the limit."""
         left = max(self._most + 1 - self.tell(), 0)
         count = super().readinto(memoryview(buffer).cast("B")[:left])
         self._refuse_more()
@@ -117,11 +119,11 @@ class _Bounded(io.FileIO):
 
 
 def _descriptor(file: str, flags: int) -> int:
-    """The open file; raises FileError where it is not regular."""
+    """The descriptor of the open file; raises FileError if it is not regular."""
     try:
         descriptor = os.open(file, flags | FLAGS)
     except OSError as error:
-        if error.errno == errno.ENXIO:  # sockets, and devices that are not there
+        if error.errno == errno.ENXIO:  # sockets and missing devices
             raise FileError(str(file), KINDS[S_IFSOCK]) from None
         raise
     mode = os.fstat(descriptor).st_mode

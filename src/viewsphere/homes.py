@@ -1,4 +1,4 @@
-"""Packages that import their public names when these are first used, so that a command loads what it needs and no more."""
+"""Packages that import their public names on first use, so that a command loads only the code it needs."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Any
 
 
 def names_of(package: str, homes: Mapping[str, str]) -> Callable[[str], Any]:
-    """A package's `__getattr__`: imports a public name from its home, a module by its dotted path."""
+    """A `__getattr__` for a package that imports a public name from its home module, given by its dotted path."""
 
     def get(name: str) -> Any:
         if name not in homes:

@@ -1,7 +1,7 @@
-"""Every limit on what files may ask for, so that none of them makes a program run out of memory or time.
+"""The limits on the resources that files may require, so that no file makes a program run out of memory or time.
 
-The variable `VIEWSPHERE_<NAME>` of the environment sets a limit anew, for this process and those that it starts; a whole number
-may have a unit, such as `20 GB`. Messages say the limit's name and value, and what was found.
+The environment variable `VIEWSPHERE_<NAME>` overrides a limit for this process and its child processes. A whole number may have
+a unit, such as `20 GB`. Error messages state the limit's name and value, and the value in the file.
 """
 
 from __future__ import annotations
@@ -19,9 +19,9 @@ UNITS = {"kb": 10**3, "mb": 10**6, "gb": 10**9, "tb": 10**12, "kib": 1 << 10, "m
 
 
 class Limit(Generic[Number]):
-    """A limit: its value here is read from the environment whenever somebody asks, else it is the default one.
+    """A limit: each access reads its value from the environment, or else returns the default.
 
-    Raises UserError where the variable is no number above 0, or no whole one for a default that is.
+    Raises UserError if the variable is not a number above 0, or not a whole number although the default is one.
     """
 
     def __init__(self, default: Number, meaning: str) -> None:
@@ -34,7 +34,7 @@ class Limit(Generic[Number]):
 
     @property
     def variable(self) -> str:
-        """The variable of the environment that sets it."""
+        """The environment variable that sets the limit."""
         return f"VIEWSPHERE_{self.name}"
 
     def __get__(self, owner: object, kind: type | None = None) -> Number:
@@ -50,7 +50,7 @@ class Limit(Generic[Number]):
 
 
 def parsed(text: str, number: type[Number]) -> Number:
-    """The number in a text, a whole one also with a unit of bytes; raises ValueError where there is none."""
+    """The number in a text; a whole number may have a unit of bytes. Raises ValueError if there is none."""
     head = text.rstrip("bBkKmMgGtTi")
     unit = UNITS.get(text[len(head) :].lower())
     if unit is None or number is not int:

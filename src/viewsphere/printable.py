@@ -1,11 +1,11 @@
-"""Text from files on its way to a terminal, which would obey control characters in it."""
+"""Text from files made safe for a terminal, which would execute control characters in it."""
 
 from __future__ import annotations
 
 from unicodedata import category
 
 CONTROL = frozenset({"Cc", "Cf", "Cs", "Zl", "Zp"})
-"""Unicode's categories of control and format characters, halves of characters, and separators of lines."""
+"""Unicode's categories of control and format characters, surrogates, and line separators."""
 
 
 def printable(text: str) -> str:
@@ -16,7 +16,7 @@ def printable(text: str) -> str:
 
 
 def is_utf8(text: str) -> bool:
-    """Return whether a name is text. The names of files may be any bytes, of which Python makes halves of characters."""
+    """Return whether a name is text. The names of files may be any bytes, and Python decodes invalid ones to surrogates."""
     try:
         text.encode()
     except UnicodeEncodeError:

@@ -1,12 +1,11 @@
-"""Folders for what is not whole yet: each belongs to one process, and goes when that process is gone.
+"""Scratch folders for unfinished files: each belongs to one process and is removed after that process ends.
 
     <prefix><host>~<pid>~<random>/lock    held by the process that made the folder, as long as it lives
-    <prefix><host>~<pid>~<random>/...     what it makes there
+    <prefix><host>~<pid>~<random>/...     its unfinished files
 
-The system takes a lock back when its holder ends, however that comes about; a process's number, by contrast, is soon another's.
-So whoever gets the lock of a folder that was made on the same host knows that its maker is dead. Of other hosts' folders, and
-where a file system has no locks, nothing is known: such a folder is left alone until nothing in it has changed for a day.
-A folder whose lock is seen to be held is left alone in any case.
+The system releases a lock when its holder ends in any way, while a process ID is soon reused. So if a process gets the lock of
+a folder made on the same host, the folder's maker is dead. For folders of other hosts, and on file systems without locks, this
+is unknown: such a folder is kept until nothing in it has changed for a day. A folder whose lock is visibly held is always kept.
 """
 
 from __future__ import annotations
@@ -27,7 +26,7 @@ from pathlib import Path
 from viewsphere.errors import UserError
 
 LOCK = "lock"
-"""Name of the file in such a folder."""
+"""Name of the lock file in a scratch folder."""
 
 HALF = "~"
 """Suffix of folders whose removal has begun."""
@@ -36,10 +35,10 @@ OPEN = os.O_RDWR | getattr(os, "O_NOFOLLOW", 0)
 """Flags to open the lock file."""
 
 TRIES = 30
-"""Folders that are made before it is said that none stays."""
+"""Attempts to make a folder before an error is raised because none persists."""
 
 STALE_S = 86_400.0
-"""Seconds without a change after which a folder of which nothing else is known is taken for a dead process's."""
+"""Seconds without a change after which a folder of unknown state counts as a dead process's folder."""
 
 
 @dataclass(frozen=True)
@@ -51,12 +50,12 @@ class ScratchDir:
 
     @staticmethod
     def make(place: Path, prefix: str = "") -> ScratchDir:
-        """A folder in this place, which exists; raises OSError where that is not possible."""
+        """A new folder in this existing place; raises OSError if it cannot be made."""
         for left in reversed(range(TRIES)):
             folder = Path(tempfile.mkdtemp(prefix=prefix + of_this_process(), dir=place))
             try:
                 made = ScratchDir(folder, _lock_of(folder, is_sure=left > 0))
-            except (FileNotFoundError, BlockingIOError):  # somebody sweeps, and takes it for a dead process's
+            except (FileNotFoundError, BlockingIOError):  # another process sweeps, and considers its maker dead
                 with suppress(OSError):
                     (folder / LOCK).unlink(missing_ok=True)
                     folder.rmdir()
@@ -66,14 +65,14 @@ class ScratchDir:
         raise OSError(errno.EAGAIN, "no folder stays that is made there", str(place))
 
     def remove(self) -> None:
-        """Remove the folder with all that is in it; a forked copy of the process that made it does nothing."""
+        """Remove the folder and its contents; a forked copy of the process that made it does nothing."""
         if self in _held:
             gone = _out_of_the_way(self.folder)
             self.leave()
             _delete(gone)
 
     def leave(self) -> None:
-        """Leave the folder as a dead process would: whoever sweeps removes it. A forked copy does nothing."""
+        """Release the folder as a dead process would: the next sweep removes it. A forked copy does nothing."""
         if self in _held:
             _held.remove(self)
             os.close(self.lock)
@@ -90,7 +89,7 @@ def of_this_process() -> str:
 
 @contextmanager
 def scratch_folder(place: Path, prefix: str = "") -> Generator[Path]:
-    """A folder of this process in a place that exists, for as long as the block lasts; raises OSError if none can be made."""
+    """A folder of this process in a place that exists, for the duration of the block; raises OSError if none can be made."""
     made = ScratchDir.make(place, prefix)
     try:
         yield made.folder
@@ -100,8 +99,8 @@ def scratch_folder(place: Path, prefix: str = "") -> Generator[Path]:
 
 @contextmanager
 def temporary(what: str) -> Generator[Path]:
-    """An empty folder among the system's temporary files, for as long as the block lasts. `what` it is for tells it from
-    others, and those of dead processes go first.
+    """An empty folder among the system's temporary files, for the duration of the block. Its purpose `what` distinguishes it
+    from others; those of dead processes are removed first.
     """
     place, prefix = Path(tempfile.gettempdir()), f"viewsphere-{what}-"
     sweep(place, prefix)
@@ -112,9 +111,9 @@ def temporary(what: str) -> Generator[Path]:
 
 
 def write_whole(file: Path, data: bytes) -> None:
-    """Write a file of these bytes, and the folders it needs. An old file stays as it was until the new one is whole.
+    """Write a file of these bytes, and the folders it needs. An old file stays unchanged until the new one is complete.
 
-    Raises UserError where the file cannot be written.
+    Raises UserError if the file cannot be written.
     """
     try:
         file.parent.mkdir(parents=True, exist_ok=True)
@@ -140,14 +139,14 @@ def _replace(target: Path, data: bytes) -> None:
 
 
 def sweep(place: Path, prefix: str = "") -> None:
-    """Remove what dead processes left in this place."""
+    """Remove folders left by dead processes in this place."""
     for _ in left_by_dead(place, prefix):
         pass
 
 
 def left_by_dead(place: Path, prefix: str = "") -> Iterator[Path]:
-    """The folders in this place whose makers are dead; each is removed when the next one is asked for. Those that somebody has
-    begun to remove are not whole any more: they go unseen.
+    """The folders in this place whose makers are dead; each is removed when the next one is requested. Folders whose removal
+    has already begun are incomplete: they are removed without being yielded.
     """
     for folder in sorted(path for path in place.glob(f"{glob.escape(prefix)}*~*~*") if not path.is_symlink()):
         is_own = folder.name.startswith(f"{prefix}{socket.gethostname()}~")
@@ -164,8 +163,8 @@ def left_by_dead(place: Path, prefix: str = "") -> Iterator[Path]:
 
 
 def lives(folder: Path) -> bool | None:
-    """Return whether the maker of a folder that lies where it made it, without a prefix, is at work; None where that is not
-    known.
+    """Return whether the maker of a folder is alive, or None if that is unknown. The folder must be at its original path and
+    have no prefix.
     """
     is_own = folder.name.startswith(f"{socket.gethostname()}~")
     try:
@@ -176,9 +175,10 @@ def lives(folder: Path) -> bool | None:
 
 
 def _lock_of(folder: Path, is_sure: bool) -> int:
-    """The lock of a folder that this process has just made; FileNotFoundError or BlockingIOError where somebody sweeps it.
+    """The lock of a folder that this process has just made. Raises FileNotFoundError or BlockingIOError if another process
+    sweeps it.
 
-    `is_sure` where files are known by their numbers, which some file systems in user space change all the time.
+    `is_sure`: inode numbers identify files here; some user-space file systems change them all the time.
     """
     try:
         lock = os.open(folder / LOCK, OPEN | os.O_CREAT)
@@ -198,8 +198,8 @@ def _lock_of(folder: Path, is_sure: bool) -> int:
 
 @contextmanager
 def _locked(file: Path, flags: int) -> Generator[bool]:
-    """Return whether a lock is this process's while the block lasts, False where that cannot be known; raises BlockingIOError
-    where it is another's.
+    """Yield True if this process holds the lock during the block, False if that cannot be determined. Raises BlockingIOError if
+    another process holds it.
     """
     try:
         lock = os.open(file, flags)
@@ -213,7 +213,9 @@ def _locked(file: Path, flags: int) -> Generator[bool]:
 
 
 def _take(lock: int) -> bool:
-    """Take a lock, False where the file system has none; raises BlockingIOError where another has it."""
+    """Take a lock, and return True; False if the file system has no locks. Raises BlockingIOError if another process holds
+    it.
+    """
     try:
         if sys.platform == "win32":
             import msvcrt
@@ -230,7 +232,7 @@ def _take(lock: int) -> bool:
     except OSError as error:
         if sys.platform == "win32" and isinstance(error, PermissionError):
             raise BlockingIOError(error.errno, "another process has it") from None
-        return False  # a system that forbids locks has none
+        return False  # a system that forbids locks counts as one without
     return True
 
 
@@ -238,24 +240,24 @@ def _is_stale(folder: Path) -> bool:
     """Return whether nothing in a folder that has a lock has changed for `STALE_S`."""
     try:
         last = max(path.lstat().st_mtime for path in (folder, folder / LOCK, *folder.rglob("*")))
-    except OSError:  # it has none, or is being changed
+    except OSError:  # it has no lock, or is being changed
         return False
     return last < time.time() - STALE_S
 
 
 def _out_of_the_way(folder: Path) -> Path:
-    """Rename a folder that is about to be removed, so that nobody takes a part of it for the whole: neither those who sweep nor
-    a maker that wakes up after all.
+    """Rename a folder before removing it, so that neither a sweeping process nor a maker that resumes mistakes the remains for
+    the complete folder.
     """
     if not folder.name.endswith(HALF):
-        with suppress(OSError):  # Windows renames no folder of an open file
+        with suppress(OSError):  # Windows cannot rename a folder that contains an open file
             return folder.rename(folder.with_name(f"{folder.name}{HALF}"))
     return folder
 
 
 def _delete(folder: Path) -> None:
-    """Delete a folder that nobody holds any more, its lock first: where Windows refuses that, another process has it open, and
-    the folder is that one's to remove.
+    """Delete a folder that no process holds any more, its lock first. If Windows refuses, another process has the lock open and
+    removes the folder itself.
     """
     gone = _out_of_the_way(folder)
     try:
@@ -266,7 +268,7 @@ def _delete(folder: Path) -> None:
 
 
 def _forget() -> None:
-    """Close the locks in a forked process, so that they go with the one that made them."""
+    """Close the locks in a forked process, so that they end with the process that made them."""
     for made in _held:
         with suppress(OSError):
             os.close(made.lock)

@@ -1,1 +1,1 @@
-"""Model files to normalised meshes, and back to OBJ and GLB."""
+"""Model files read as normalised meshes, and meshes exported to OBJ and GLB."""

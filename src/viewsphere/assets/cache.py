@@ -1,10 +1,9 @@
-"""Normalised meshes kept by content: a model is read once, and again when any of its files, settings or
-readers change.
+"""A cache of normalised meshes by content: a model is read once, and again when any of its files, settings or readers change.
 
-An entry is two files: `<first>.arrays` lists the files that the model named when it was last read, and
-`<second>.arrays` holds the mesh. The first name is the digest of the model's bytes, its settings and the
-readers; the second adds the bytes of the files listed. So an entry is never stale, and two folders with equal
-files share it. Other models are read in a process of their own (`sandbox`).
+An entry is two files: `<first>.arrays` lists the files that the model named when it was last read, and `<second>.arrays` holds
+the mesh. The first name is the digest of the model's bytes, its settings and the readers; the second adds the bytes of the
+files listed. So an entry is never stale, and two folders with equal files share it. Models that are not in the cache are read
+in a separate process (`sandbox`).
 """
 
 from __future__ import annotations
@@ -43,7 +42,7 @@ from viewsphere.scratch import scratch_folder, temporary
 SETTINGS = ("up", "forward", "unit", "centring", "scale", "real_size", "confined", "clip", "fps", "shown")
 PREFIX = "reading-"
 BATCH = 32
-"""Most frames of a file that are read at once."""
+"""Greatest number of frames of a file that are read at once."""
 
 LIBRARIES = ("numpy", "lxml", "pillow", "charset-normalizer", "DracoPy", "meshopt", "opengl_basisu", "usd-core")
 """Packages that parse model files. A model whose reader lacked one of the optional ones is read again once it is installed."""
@@ -63,13 +62,13 @@ def load(
     folder: Path | None = None,
     step: TimeStep | None = None,
 ) -> tuple[Mesh, FileFacts]:
-    """The model in object axes and metres at a time step (None: as it rests), and what its file says of itself; from the cache
-    when it holds them.
+    """The model in object axes and metres at a time step (None: at rest), and the facts in its file; from the cache if it holds
+    them.
 
-    A source of models supplies a mesh, or a file that is read in its place; such meshes are normalised too but neither cached
-    here nor made in another process. `folder` is the cache's, by default `cache_folder()`. A damaged entry is
-    built again; a cache that cannot be written is no error. Read back, every array is equal bit for bit. Raises ModelError as
-    the readers do and when reading takes too long or too much.
+    A source of models supplies a mesh, or a file to read in its place. Such meshes are normalised, too, but not cached here and
+    not made in another process. `folder` is the cache's, by default `cache_folder()`. A damaged entry is rebuilt; a cache that
+    cannot be written is not an error. Every array read back is equal bit for bit. Raises ModelError as the readers do, and if
+    reading takes too much time or memory.
     """
     frame = frame_of(spec, step)
     if spec.parts is not None:
@@ -88,7 +87,7 @@ def load(
     try:
         first = _first_digest(path, inside, spec, frame)
     except OSError:
-        first = None  # the reader says what is wrong with the file
+        first = None  # the reader reports the file's problem
     stored = None if first is None else _stored(folder, first, path)
     if stored is not None:
         return stored
@@ -102,14 +101,14 @@ def load(
 
 
 def frame_of(spec: ModelSpec, step: TimeStep | None) -> int | None:
-    """The frame of its file at which a model is meant at a time step (None: as it rests); None for a file as it stands."""
+    """The frame of its file for a model at a time step (None: at rest); None if the file is read without an animation frame."""
     return spec.rest if step is None else step.frame
 
 
 def read_ahead(spec: ModelSpec, frames: Iterable[int], folder: Path | None = None) -> None:
-    """Put what the cache lacks of an animated model at these frames into it: the file is opened once for many.
+    """Add the missing ones of these frames of an animated model to the cache, opening the file once for many frames.
 
-    Raises ModelError as `load` does; a cache that cannot be written is no error.
+    Raises ModelError as `load` does; a cache that cannot be written is not an error.
     """
     folder = folder or cache_folder()
     spec = spec if spec.parts is None else spec.whole
@@ -132,8 +131,8 @@ def read_ahead(spec: ModelSpec, frames: Iterable[int], folder: Path | None = Non
 
 
 def kept(path: Path, about: str, ask: Callable[[], tuple[Any, Iterable[Path]]]) -> Any:
-    """Return the plain data that `ask` computes from a file, from the cache while the file stays the same. `ask` also returns
-    the files that it read; these must stay the same, too.
+    """Return the plain data that `ask` computes from a file, from the cache while the file is unchanged. `ask` also returns the
+    files that it read, which must be unchanged, too.
     """
     try:
         with open_file(path) as file:
@@ -154,13 +153,13 @@ def kept(path: Path, about: str, ask: Callable[[], tuple[Any, Iterable[Path]]]) 
 
 
 def _batches(frames: Sequence[int]) -> Iterable[Sequence[int]]:
-    """So many frames at once that what they leave on disk stays small, and opening the file counts for little."""
+    """Batches of frames, small enough to limit disk use, and large enough to make opening the file cheap."""
     return (frames[i : i + BATCH] for i in range(0, len(frames), BATCH)) if len(frames) > 1 else ()
 
 
 @contextmanager
 def _aside(folder: Path) -> Generator[Path]:
-    """A new folder in the cache (in the system's folder for such, if that cannot be written) that does not stay."""
+    """A temporary folder in the cache, or in the system's temporary folder if the cache cannot be written."""
     with ExitStack() as then:
         then.callback(sweep_once, folder, PREFIX, os.getpid())
         try:
@@ -172,7 +171,7 @@ def _aside(folder: Path) -> Generator[Path]:
 
 
 def in_file(spec: ModelSpec, file: Path) -> ModelSpec:
-    """The specification of a model of a source as that of the file that the source supplies."""
+    """The specification for the file that a source of models supplies, from the specification of the source's model."""
     return spec.model_copy(update={"source": str(file)})
 
 
@@ -191,7 +190,7 @@ def _facts(spec: ModelSpec, named: Named, mesh: Mesh) -> FileFacts:
 
 
 def cache_folder() -> Path:
-    """Return the folder of cached models: `$VIEWSPHERE_CACHE/models`, else in the user's cache folder."""
+    """Return the folder of cached models: `$VIEWSPHERE_CACHE/models`, else a folder in the user's cache folder."""
     return cache_of("models")
 
 
@@ -229,7 +228,7 @@ def _second_digest(first: str, path: Path, names: Iterable[str]) -> str:
         digest.update(name.encode(errors="surrogateescape") + b"\0")
         other = path.parent / name
         try:
-            if not other.is_file():  # a pipe would never end
+            if not other.is_file():  # reading a pipe would never end
                 raise FileNotFoundError(other)
             with open_file(other) as file:
                 digest.update(hashlib.file_digest(file, "sha256").digest())
@@ -246,7 +245,7 @@ def _is_stored(folder: Path, first: str, path: Path) -> bool:
 
 
 def _stored(folder: Path, first: str, path: Path) -> tuple[Mesh, FileFacts] | None:
-    """The mesh in the cache and its facts, None when they are not there or damaged."""
+    """The mesh in the cache and its facts, None if they are missing or damaged."""
     try:
         names = read_entry(_named(folder, first))
         held = None if names is None else read_entry(_named(folder, _second_digest(first, path, names.about)))
@@ -254,7 +253,7 @@ def _stored(folder: Path, first: str, path: Path) -> tuple[Mesh, FileFacts] | No
             return None
         mesh, facts = unpacked(held, path)
         return mesh, replace(facts, files=tuple(path.parent / name for name in names.about))
-    except Exception:  # whatever is wrong with an entry, the answer is to build it again
+    except Exception:  # an entry with any problem is rebuilt
         return None
 
 
@@ -263,7 +262,7 @@ def _named(folder: Path, name: str) -> Path:
 
 
 def _names(path: Path, files: Iterable[Path]) -> list[str]:
-    """Paths of files that a model depends on, from its own folder."""
+    """Paths of files that a model depends on, relative to its own folder."""
     root = os.path.realpath(path.parent)
     return sorted({_from(root, os.path.realpath(file)).replace(os.sep, "/") for file in files})
 
@@ -276,7 +275,7 @@ def _from(root: str, file: str) -> str:
 
 
 def _store(folder: Path, first: str, path: Path, files: Iterable[Path], mesh: Path) -> None:
-    """Move a mesh's file into the cache; each of the two files appears whole or not at all."""
+    """Move a mesh's file into the cache; each of the two files appears completely or not at all."""
     names = _names(path, files)
     with suppress(OSError):
         publish(mesh, _named(folder, _second_digest(first, path, names)))

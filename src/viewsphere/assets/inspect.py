@@ -1,4 +1,4 @@
-"""Reports a model file's contents, and the model after normalisation."""
+"""Reports of a model file's contents and of the model after normalisation."""
 
 from __future__ import annotations
 
@@ -26,15 +26,15 @@ from viewsphere.recipe.reading.sidecar import ENDING
 class ModelReport:
     """A model after normalisation, and facts about its file.
 
-    `size` (width, height, length) and `bounds` (lowest and highest corner) are metres in object axes;
-    `raw_size` is the file's own, along its own x, y and z. `parts` are names and triangle counts; `materials`
-    names and the fields that are not the default; `textures` names and (width, height) in pixels. `animation` is None
-    where nothing moves, or where Blender cannot say when, which is then among the `suggestions`.
+    `size` (width, height, length) and `bounds` (lowest and highest corner) are metres in object axes; `raw_size` is the size
+    along the file's own x, y and z. `parts` are names and triangle counts; `materials` are names and non-default fields;
+    `textures` are names and (width, height) in pixels. `animation` is None if nothing moves, or if Blender cannot report the
+    times, which then appears in `suggestions`.
 
-    `diameter` is the largest distance between two vertices, metres. `symmetries` (as a sidecar has them) are those that the
-    model declares, if it `declares` any, else those of its surface, and `keypoints` its named points, both in the `axes` that
-    are told: those of the file with its own unit, of the object for a model of a source. `sidecar` is the name of the file
-    beside the model that says or may say this, empty for a source.
+    `diameter` is the largest distance between two vertices, metres. `symmetries` (in a sidecar's format) are those that the
+    model declares, if it `declares` any, else those of its surface. `keypoints` are its named points. Both are in the reported
+    `axes`: the file's with its own unit, or the object's for a model of a source. `sidecar` is the name of the file beside the
+    model that holds or may hold these facts, empty for a source.
     """
 
     source: str
@@ -64,7 +64,7 @@ class ModelReport:
 
 
 def describe(source: Path | ModelSpec) -> ModelReport:
-    """Read a model and report what is in it; a path is read with default settings.
+    """Read a model and report its contents; a path is read with default settings.
 
     Raises ModelError as reading and normalising do.
     """

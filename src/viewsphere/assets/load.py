@@ -1,4 +1,4 @@
-"""Any model file to a raw mesh, in the file's own axes and unit."""
+"""Loading of any model file as a raw mesh, in the file's own axes and unit."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ KNOWN = {
     "x": "DirectX",
     "x3d": "X3D",
 }
-"""Model formats that are not read, by suffix."""
+"""Unsupported model formats by suffix."""
 
 IN_BLENDER = {"x3d", "wrl"}
 """Formats of `KNOWN` that Blender opens with an extension."""
@@ -45,12 +45,12 @@ def load_model(
 ) -> tuple[Mesh, FileFacts]:
     """Read a model file, in this process: its triangles in its own axes and unit, and its own statements about both.
 
-    Its suffix chooses the reader, whose spec has the axes and the unit of such files (`readers`). Of .blend files,
-    `file.blend/Object/NAME` and `file.blend/Collection/NAME` are parts. With `confined`, files that the model names
-    (textures, buffers, material libraries) are read only from its own folder and below; `shown` are objects of a .blend file
-    that are read although renders do not show them; `node` names one of a glTF file below which is what is read. Raises
-    ModelError in one line that names the file: missing, empty, truncated, not a model, no triangles, or more of them than
-    `limits` allows.
+    The suffix selects the reader, whose spec has the axes and the unit of such files (`readers`). In .blend files,
+    `file.blend/Object/NAME` and `file.blend/Collection/NAME` select parts. With `confined`, files that the model names
+    (textures, buffers, material libraries) are read only from its own folder and below. `shown` are objects of a .blend file
+    that are read although renders do not show them. `node` names a node of a glTF file; only the nodes below it are read.
+    Raises ModelError in one line that names the file: missing, empty, truncated, not a model, no triangles, or more of them
+    than `limits` allows.
     """
     reader = _reader(path)
     from viewsphere.assets.paths.folder import ModelFolder
@@ -72,8 +72,7 @@ def load_frames(
 ) -> Iterator[tuple[Mesh, FileFacts]]:
     """A model file's meshes at its first frame, then at each of the ascending `frames`; the file is opened once.
 
-    `clip` names the animation that is played, where the file has several; `fps` is how many frames make a second, None for
-    the file's own.
+    `clip` names the animation to play if the file has several; `fps` is the frame rate, None for the file's own.
 
     Otherwise as `load_model`; ModelError for files that cannot move.
     """
@@ -132,7 +131,7 @@ def needs_blender(suffix: str) -> bool:
 
 
 def _reader(path: Path) -> ReaderSpec:
-    """The reader of a file; raises ModelError where there is none, or its packages are not installed."""
+    """The reader of a file; raises ModelError if there is none, or its packages are not installed."""
     reader = reader_of(check_source(path))
     assert reader is not None
     if absent := missing(reader):

@@ -1,4 +1,4 @@
-"""Mesh: triangles with every glTF 2.0 material field, whatever file they came from."""
+"""Mesh: triangles with all glTF 2.0 material fields, from any file format."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ WRAPS: tuple[Wrap, ...] = get_args(Wrap)
 
 @dataclass(frozen=True, eq=False)
 class Image:
-    """Pixels (H, W, 4) uint8 RGBA, row 0 on top, as the file has them (sRGB for colours, linear for data)."""
+    """Pixels (H, W, 4) uint8 RGBA, row 0 on top, encoded as in the file (sRGB for colours, linear for data)."""
 
     name: str
     pixels: NDArray[np.uint8]
@@ -48,7 +48,7 @@ class Texture:
 
 
 HIGHEST_IOR = 4.0
-"""Index of refraction that a file's material has at most: germanium's; diamond's is 2.4."""
+"""Greatest index of refraction for a file's material: germanium's; diamond's is 2.4."""
 
 
 @dataclass(frozen=True)
@@ -83,7 +83,7 @@ class Material:
     transmission: float = 0.0
     transmission_texture: Texture | None = None
     ior: float = 1.5
-    thickness: float = 0.0  # of what transmits; 0: a thin sheet, which refracts nothing, else its surface bounds a solid
+    thickness: float = 0.0  # of transmitting materials; 0: a thin sheet without refraction, else the surface bounds a solid
     specular: float = 1.0
     specular_texture: Texture | None = None
     specular_color: tuple[float, float, float] = (1.0, 1.0, 1.0)
@@ -94,11 +94,11 @@ class Material:
 class Mesh:
     """A whole model as one triangle list; object axes: metres, +Z up, front -Y (once normalised).
 
-    vertices (V, 3) float32; triangles (T, 3) int32, counter-clockwise seen from outside; normals (V, 3)
-    float32, unit length, for shading; uv0, uv1 (V, 2) float32 or None; colors (V, 4) float32 linear or None,
-    multiplied with the base colour; triangle_material, triangle_part (T,) int32 index `materials` and `parts`
-    (never empty). triangle_body_part (T,) int32: the number from 1 in `body_parts` of what a skin's bones move, 0 for none;
-    None for models without bones. `warnings` say what the file's reader had to mend or leave out.
+    vertices (V, 3) float32; triangles (T, 3) int32, counter-clockwise seen from outside; normals (V, 3) float32, unit length,
+    for shading; uv0, uv1 (V, 2) float32 or None; colors (V, 4) float32 linear or None, multiplied with the base colour;
+    triangle_material, triangle_part (T,) int32 index `materials` and `parts` (never empty). triangle_body_part (T,) int32: the
+    triangle's entry in `body_parts`, counted from 1, 0 for none; None for models without bones. `warnings` report the repairs
+    and omissions of the file's reader.
     """
 
     vertices: NDArray[np.float32]

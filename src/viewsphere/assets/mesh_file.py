@@ -1,4 +1,4 @@
-"""A mesh and the facts of its file as one file of the cache."""
+"""The cache file of a mesh and the facts of its source file."""
 
 from __future__ import annotations
 
@@ -27,14 +27,14 @@ FACTS = ("format", "up", "forward", "unit", "origin", "size", "object_from_file"
 
 
 def write_mesh(path: Path, mesh: Mesh, facts: FileFacts) -> None:
-    """Write a mesh with its materials and images, and all of its file's facts but `path` and `files`."""
+    """Write a mesh with its materials and images, and all facts of its source file except `path` and `files`."""
     content = packed(mesh, facts)
     write_arrays(path, content.about, content.arrays)
 
 
 def read_mesh(path: Path, source: Path) -> tuple[Mesh, FileFacts]:
-    """The mesh of the model `source` as `write_mesh` stored it, bit for bit. A damaged file raises ValueError, TypeError or
-    KeyError.
+    """The mesh and facts of the model `source` as stored by `write_mesh`, bit for bit. Raises ValueError, TypeError or KeyError
+    for a damaged file.
     """
     return unpacked(read_arrays(path), source)
 
@@ -57,7 +57,7 @@ def packed(mesh: Mesh, facts: FileFacts) -> Content:
 
 
 def unpacked(content: Content, source: Path) -> tuple[Mesh, FileFacts]:
-    """The mesh and the facts of the model `source` that `packed` made plain; raises as `read_mesh` does."""
+    """The mesh and the facts of the model `source` from the plain data of `packed`; raises as `read_mesh` does."""
     header: dict[str, Any] = content.about
     arrays = {name: content.arrays[name] for name in ARRAYS if name in content.arrays}
     pixels = [content.arrays[f"image{i}"] for i in range(len(header["images"]))]

@@ -1,4 +1,4 @@
-"""A raw mesh to an object: +Z up, front -Y, metres, centred."""
+"""Conversion of a raw mesh to an object: +Z up, front -Y, metres, centred."""
 
 from __future__ import annotations
 
@@ -19,18 +19,18 @@ PROPORTION_TOLERANCE = 0.1
 
 
 def normalise(mesh: Mesh, facts: FileFacts, spec: ModelSpec, first: tuple[Mesh, FileFacts] | None = None) -> Mesh:
-    """The mesh in object axes and metres: turned, scaled and centred as the model's settings say.
+    """The mesh in object axes and metres: rotated, scaled and centred according to the model's settings.
 
-    Axes: `spec.up` becomes +Z and `spec.forward` -Y, by an exact permutation and change of signs; unset axes
-    are the file's. Scale: `as_is` keeps the file's unit (or `spec.unit` metres); `real_size` scales uniformly
-    until the length (along Y) is the real one's: the model keeps its proportions, and a warning says when
-    they differ from the real ones by more than 10 %; a number is the length in metres. Centring: `box` puts
-    the box's centre at the origin, `area` the area-weighted centroid of the surface, `floor` the box's centre
-    in x and y and its lowest point at z = 0; `as_is` keeps the file's own origin.
+    Axes: `spec.up` becomes +Z and `spec.forward` -Y, by an exact permutation and change of signs; unset axes default to the
+    file's. Scale: `as_is` keeps the file's unit (or `spec.unit` metres); `real_size` scales uniformly until the length (along
+    Y) is the real one's: the model keeps its proportions, and a warning says when they differ from the real ones by more than
+    10 %; a number is the length in metres. Centring: `box` puts the box's centre at the origin, `area` the area-weighted
+    centroid of the surface, `floor` the box's centre in x and y and its lowest point at z = 0; `as_is` keeps the file's own
+    origin.
 
-    Computed in float64, stored as float32; triangles come sorted by part and material, otherwise in the
-    file's order. `first`, the mesh and facts of an animation's first frame, sets scale and centre for all frames, so that
-    motion is kept. Raises ModelError for parallel axes and for a result smaller or larger than `limits` allows.
+    Computed in float64, stored as float32; triangles are sorted by part and material, otherwise in the file's order. `first`,
+    the mesh and facts of an animation's first frame, sets scale and centre for all frames, so that motion is kept. Raises
+    ModelError for parallel axes and for a result smaller or larger than `limits` allows.
     """
     turn, factor, center, warnings = _placing_of(mesh, facts, spec, first)
     origin = facts.origin if first is None else first[1].origin
@@ -46,9 +46,11 @@ def normalise(mesh: Mesh, facts: FileFacts, spec: ModelSpec, first: tuple[Mesh, 
 
 
 def sorted_by_part(mesh: Mesh) -> Mesh:
-    """The mesh with its triangles sorted by part and material, otherwise in their order; the same one if they are already."""
+    """The mesh with its triangles sorted by part and material, otherwise in their order; the same object if they already
+    are.
+    """
     order = np.lexsort((mesh.triangle_material, mesh.triangle_part))
-    if (order[1:] > order[:-1]).all():  # arrays of the cache stay those that all processes share
+    if (order[1:] > order[:-1]).all():  # the cache's arrays remain shared by all processes
         return mesh
     return replace(
         mesh,
@@ -60,7 +62,9 @@ def sorted_by_part(mesh: Mesh) -> Mesh:
 
 
 def placed(mesh: Mesh, facts: FileFacts, spec: ModelSpec, first: tuple[Mesh, FileFacts] | None = None) -> FileFacts:
-    """The facts with where the file's coordinates are in the normalised mesh; arguments and errors as for `normalise`."""
+    """The facts with the transform from the file's coordinates to the normalised mesh; arguments and errors as for
+    `normalise`.
+    """
     turn, factor, center, _ = _placing_of(mesh, facts, spec, first)
     origin = facts.origin if first is None else first[1].origin
     matrix = rigid(factor * turn, -factor * transform(turn, origin) - center).tolist()
@@ -92,9 +96,10 @@ def _placing(mesh: Mesh, turn: Float, facts: FileFacts, spec: ModelSpec) -> tupl
 
 
 def axes(spec: ModelSpec, facts: FileFacts) -> tuple[Axis, Axis]:
-    """Up and forward of a model: its settings', else the file's. An `up` along the file's forward turns both axes of the file.
+    """Up and forward axes of a model, from its settings, else from the file. An `up` along the file's forward axis rotates both
+    axes of the file.
 
-    Raises ModelError for a `forward` along the file's up axis, as nothing says which way is up then.
+    Raises ModelError for a `forward` along the file's up axis, because the up direction is then undefined.
     """
     up, forward = spec.up or facts.up, spec.forward or facts.forward
     if up[1] != forward[1] or (spec.up and spec.forward):

@@ -1,4 +1,4 @@
-"""Some of the parts of a mesh as a mesh of its own."""
+"""Selected parts of a mesh as a separate mesh."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ from viewsphere.model.thing import TimeStep
 VERTEX = ("uv0", "uv1", "colors")
 
 OWN_SLASH = "\u2215"
-"""Stands for a slash in an object's name, as Blender's worker writes it in names of parts."""
+"""The character that replaces a slash in an object's name in the part names of Blender's worker."""
 
 
 def taken(mesh: Mesh, spec: ModelSpec, step: TimeStep | None = None) -> Mesh:
     """Return the parts of a whole model's mesh that `spec.parts` selects at a time step, with the materials and images that
     they use.
 
-    Raises ModelError where the selection is empty.
+    Raises ModelError if the selection is empty.
     """
     assert spec.parts is not None
     chosen = is_taken(mesh.parts, spec.parts)[mesh.triangle_part]
@@ -55,14 +55,14 @@ def taken(mesh: Mesh, spec: ModelSpec, step: TimeStep | None = None) -> Mesh:
 
 
 def is_taken(names: Sequence[str], parts: Parts) -> NDArray[np.bool_]:
-    """Return whether each part (N,) is one of those."""
+    """A mask (N,) of the part names that the selection includes."""
     only = None if parts.only is None else frozenset(map(own_part, parts.only))
     without = frozenset(map(own_part, parts.without))
     return np.array([(only is None or _is_of(name, only)) and not _is_of(name, without) for name in names], np.bool_)
 
 
 def own_part(name: str) -> str:
-    """Name of the part that an object of this name is: slashes part it from what it instances."""
+    """Name of the part for an object of this name; slashes would separate it from the objects it instances."""
     return name.replace("/", OWN_SLASH)
 
 
@@ -75,7 +75,7 @@ def _is_of(part: str, objects: frozenset[str]) -> bool:
 def _turned(
     vertices: NDArray[np.float32], normals: NDArray[np.float32], axes: NDArray[np.float64]
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """In the parts' axes (file from axes)."""
+    """Vertices and normals in the parts' axes (file from axes)."""
     if (axes == np.eye(4)).all():
         return vertices, normals
     turn = axes[:3, :3].T

@@ -20,7 +20,7 @@ from viewsphere.model.model_spec import Axis
 from viewsphere.model.scene import IDENTITY, Matrix4
 
 FAINTEST = 0.01
-"""Alpha below which blended texels are no surface for labels: the default of a recipe's `label_alpha`."""
+"""Alpha below which blended texels do not count as surface for labels: the default of a recipe's `label_alpha`."""
 
 
 Float = NDArray[np.float64]
@@ -33,7 +33,7 @@ BLOCK = 1 << 16
 """Rows that are computed at once: their arrays stay in a processor's cache, which makes 5 million triangles 4 times as fast."""
 
 FAR = 1e3
-"""A model this many times its own size away from the file's origin is stored around its own centre."""
+"""A model farther from the file's origin than this multiple of its size is stored around its own centre."""
 
 
 @dataclass(frozen=True)
@@ -43,8 +43,8 @@ class FileFacts:
     `unit` is metres in one unit of the file. The raw mesh's vertices plus `origin` are the file's coordinates. `origin` is zero
     unless the model is so far away that float32 would lose its shape. `size` are the extents along the file's own x, y and z,
     in its unit. `files` are every file that the reader read or searched for. `keypoints` are points that the file names, in its
-    coordinates. `marks` are objects that state their purpose. `object_from_file` transforms the file's coordinates to the
-    object's, once it is normalised.
+    coordinates. `marks` are annotated objects. `object_from_file` transforms the file's coordinates to the object's, after
+    normalisation.
     """
 
     path: Path
@@ -63,7 +63,7 @@ class FileFacts:
 @dataclass(frozen=True, eq=False)
 class Primitive:
     """Some triangles of one part and material; arrays as in Mesh but float64, normals None if unknown. `bone` (T,) is each
-    triangle's among `bones`, as `skin.strongest` gives it, None where no skin bends the piece.
+    triangle's index in `bones`, from `skin.strongest`; None if no skin bends the piece.
     """
 
     part: str
@@ -79,12 +79,12 @@ class Primitive:
 
 
 def blocks(count: int) -> Iterator[slice]:
-    """Runs of at most `BLOCK` of so many rows."""
+    """Slices of at most `BLOCK` rows that cover `count` rows."""
     return (slice(start, min(start + BLOCK, count)) for start in range(0, count, BLOCK))
 
 
 def used_numbers(numbers: Int, count: int) -> tuple[Int, Int]:
-    """The numbers below `count` that occur, ascending, and each number's place among them: `np.unique` without sorting."""
+    """The numbers below `count` that occur, ascending, and each number's position among them: `np.unique` without sorting."""
     is_used = np.zeros(count, np.bool_)
     is_used[numbers] = True
     return np.flatnonzero(is_used), (np.cumsum(is_used) - 1)[numbers]
@@ -99,7 +99,7 @@ def compact(piece: Primitive) -> Primitive:
 
 
 def pick(piece: Primitive, vertices: NDArray[np.integer]) -> Primitive:
-    """The piece with these of its vertices, in this order; its triangles are left as they are."""
+    """The piece with these of its vertices, in this order; its triangles are unchanged."""
 
     def taken(array: Float | None) -> Float | None:
         return None if array is None else array[vertices]
@@ -119,8 +119,8 @@ def assemble(
 ) -> tuple[Mesh, FileFacts]:
     """Join pieces into one mesh, with its parts in order of first appearance and without unused materials and images.
 
-    Triangles without area are dropped with a warning; a zero or NaN normal becomes the mean of its faces' normals, with a
-    warning too. Raises ModelError for NaN and infinite coordinates, and when no triangle is left or there are too many.
+    Triangles without area are dropped with a warning; a zero or NaN normal becomes the mean of its faces' normals, also with a
+    warning. Raises ModelError for NaN and infinite coordinates, and when no triangle is left or there are too many.
     """
     pieces, materials = _without_lost_textures(folder, pieces, materials)
     count = sum(len(piece.triangles) for piece in pieces)
@@ -177,7 +177,7 @@ def assemble(
 
 
 def _check_layers(folder: ModelFolder, positions: Float, triangles: Int) -> None:
-    """Raise ModelError where triangles lie upon one another so often that drawing the model would take no end of time."""
+    """Raise ModelError if so many triangles overlap that rendering the model would take far too long."""
     area = 0.0
     for part in blocks(len(triangles)):
         area += float(np.linalg.norm(face_normals(positions, triangles[part]), axis=1).sum()) / 2
@@ -312,7 +312,7 @@ def used_images(materials: Sequence[Material], images: Sequence[Image]) -> tuple
 
 
 def _is_unseen(mesh: Mesh) -> bool:
-    """Return whether every triangle is clear all over: by its material, its texels or its vertices' colours."""
+    """Return whether every triangle is completely transparent by its material, texels or vertex colours."""
     return all(_is_clear(mesh, index) for index in np.unique(mesh.triangle_material).tolist())
 
 
@@ -328,7 +328,7 @@ def _is_clear(mesh: Mesh, index: int) -> bool:
 
 
 def _texels(mesh: Mesh, index: int) -> float:
-    """The highest alpha of a texel that triangles of a material show; of a rotated or mirrored texture, of any texel."""
+    """The highest alpha of the texels that triangles of a material show; for a rotated or mirrored texture, of all texels."""
     texture = mesh.materials[index].base_color_texture
     uv = None if texture is None else (mesh.uv0, mesh.uv1)[texture.texcoord]
     if texture is None or uv is None:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 PROPERTY = "viewsphere"
-"""The custom property (glTF's `extras`) that says what an object is; `width` and `closed` beside it are a lane's."""
+"""The custom property (glTF's `extras`) with an object's kind; a lane may also have `width` and `closed`."""
 
 FLOOR, LANE, SURFACE, INDOORS = KINDS = ("floor", "lane", "surface", "indoors")
 
@@ -16,7 +16,7 @@ NAMED = re.compile(rf"({FLOOR}|{LANE}|{SURFACE})(?![^\W\d_])", re.IGNORECASE)
 """The beginning of the name of an annotated object; `surfaces` and `lanes` are other words."""
 
 BLENDERS_NUMBER = re.compile(r"\.\d{3,}$")
-"""The number that Blender appends to a name that exists already."""
+"""The number that Blender appends to a duplicate name."""
 
 Point = tuple[float, float, float]
 Edge = tuple[int, int]
@@ -24,9 +24,9 @@ Edge = tuple[int, int]
 
 @dataclass(frozen=True)
 class Annotation:
-    """An object that says what it is. `part`: the mesh's part that it is, empty where it has no triangles. `points`: of a lane,
-    in the file's coordinates, in the direction of travel. `width`: metres, None where it says none. `problem`: why it cannot
-    be what it says; empty for none.
+    """An annotated object. `part`: its part of the mesh, empty if it has no triangles. `points`: a lane's points in the file's
+    coordinates, in the direction of travel. `width`: metres, None if not given. `problem`: the reason why the annotation is
+    invalid; empty if it is valid.
     """
 
     kind: str
@@ -66,7 +66,7 @@ def kind_of(name: str, said: Any = None) -> str:
 
 def own_name(name: str) -> str:
     """Return the name of an annotated object in recipes: its name in lower case, without its kind and without Blender's number.
-    `Lane.001` gives `lane`, as nothing else is left.
+    `Lane.001` gives `lane`, since nothing else is left.
     """
     plain = BLENDERS_NUMBER.sub("", name)
     return NAMED.sub("", plain, 1).strip(" ._-:").lower() or plain.strip().lower()
@@ -79,7 +79,7 @@ def naturally(name: str) -> tuple[Any, ...]:
 
 def annotation_of(marker: Marker) -> Annotation | None:
     """Return the annotation of an object; None without one. A name alone makes an object a floor or surface only where it has
-    triangles, which the mesh's parts show. It makes a lane only of a line, or of an object without triangles.
+    triangles, which the mesh's parts show. It makes an object a lane only if the object is a line or has no triangles.
     """
     said = marker.said.get(PROPERTY)
     kind = kind_of(marker.name, said)
@@ -98,11 +98,11 @@ def annotation_of(marker: Marker) -> Annotation | None:
 def _lane(marker: Marker, is_said: bool) -> Annotation | None:
     if not marker.points and (marker.part or (marker.is_group and not marker.children)):
         if not is_said:
-            return None  # a road that is called so, or a group of things
+            return None  # a road with this name, or a group of objects
         found = "faces" if marker.part else "an object without either"
         return Annotation(LANE, marker.name, problem=f"expected a line, or empties below it; found {found}")
     if not is_said and not marker.points and not marker.children:
-        return None  # a lamp or a camera that is called so
+        return None  # a lamp or a camera with this name
     closed, problem = marker.said.get("closed", False) in (True, 1), ""
     points = tuple(place for _, place in sorted(marker.children, key=lambda child: naturally(child[0])))
     if marker.points:
@@ -121,9 +121,9 @@ def _lane(marker: Marker, is_said: bool) -> Annotation | None:
 
 
 def chained(points: Sequence[Point], edges: Sequence[Edge]) -> tuple[tuple[Point, ...], bool, str]:
-    """The points along edges from end to end, whether these close a ring, and what keeps them from being one line.
+    """The points along edges from end to end, whether the edges form a ring, and the reason why they are not one line, if any.
 
-    It begins at the end that its edge leads away from; where both or none are such, at the one that comes first.
+    The line starts at the end that its edge leads away from; if both or neither end is such, at the first one.
     """
     first = {point: i for i, point in reversed([*enumerate(points)])}
     welded = [(first[points[a]], first[points[b]]) for a, b in edges if points[a] != points[b]]

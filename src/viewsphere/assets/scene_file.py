@@ -1,4 +1,4 @@
-"""The contents of a .blend scene: Blender lists them once, without handing over meshes."""
+"""The contents of a .blend scene, which Blender lists once, without meshes."""
 
 from __future__ import annotations
 
@@ -70,7 +70,7 @@ class SceneFile:
 
 @lru_cache(maxsize=64)
 def scene_file(path: Path, confined: bool = True, shown: tuple[str, ...] = (), frames: tuple[int, ...] = ()) -> SceneFile:
-    """The file's contents at its first frame and at `frames`; `shown` are patterns of objects that count although renders do
+    """The file's contents at its first frame and at `frames`; `shown` are patterns of objects to include although renders do
     not show them.
 
     With `confined`, nothing outside of the file's folder is read. Raises ModelError in one line for a file that Blender cannot

@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 STEPS = 8
-"""Newton steps that give all digits of roots of numbers between 0.001 and 1000."""
+"""Number of Newton steps for fully precise roots of numbers between 0.001 and 1000."""
 
 FINE = 65_535
-"""Steps of linear light in the table of sRGB bytes: in the steepest part, the darkest, 20 steps are one byte."""
+"""Steps of linear light in the table of sRGB bytes: in the steepest (darkest) part, one byte spans 20 steps."""
 
 
 def linear(srgb: ArrayLike) -> NDArray[np.float64]:
@@ -37,8 +37,8 @@ def srgb_bytes(light: NDArray[np.floating]) -> NDArray[np.uint8]:
 
 
 def root(values: NDArray[np.float64], degree: Literal[3, 5]) -> NDArray[np.float64]:
-    """Third or fifth root of values about 1 (third ones from 1e-6 on), by Newton's method: numpy's powers round differently on
-    each processor.
+    """Third or fifth root of values near 1 (third roots from 1e-6 on), by Newton's method, because numpy's powers round
+    differently on each processor.
     """
     root = np.sqrt(np.sqrt(values))
     for _ in range(STEPS):

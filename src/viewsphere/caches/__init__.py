@@ -1,4 +1,4 @@
-"""Results that viewsphere keeps because it can make them again: one folder, found by content, within one limit.
+"""Reproducible results that viewsphere caches: one folder with one size limit, addressed by content.
 
     <cache>/<kind>/<digest>.arrays    an entry of `arrays`: JSON and numpy arrays, checked by a digest, mapped into memory
     <cache>/<kind>/...                other files of a kind, such as compiled kernels
@@ -22,11 +22,11 @@ KINDS: Mapping[str, str] = {
     "parts": "convex parts of models",
     "zoo": "models of the zoo",
 }
-"""Folders of the cache, and their content. All of it can be made again."""
+"""Folders of the cache and a description of their content. All of it can be recreated."""
 
 
 def cache_folder() -> Path:
-    """The folder of all caches: `$VIEWSPHERE_CACHE`, else viewsphere's in the user's cache folder. It may not exist."""
+    """The folder of all caches: `$VIEWSPHERE_CACHE`, else viewsphere's folder in the user's cache folder. It may not exist."""
     return Path(os.environ.get("VIEWSPHERE_CACHE") or platformdirs.user_cache_dir("viewsphere"))
 
 

@@ -31,9 +31,9 @@ from viewsphere.files import open_file
 
 MAGIC = b"VSA1"
 MAPPED_BYTES = 1 << 20
-"""Bytes from which on a file is mapped: three quarters of what a town's models take. Each mapping holds an open file, of which
-a process may have 1,024, and a program that truncates a mapped file in place ends the processes that map it. viewsphere itself
-only replaces and deletes files.
+"""Size in bytes from which a file is mapped; such files hold three quarters of the bytes of a town's models. Each mapping holds
+an open file, and a process may have 1,024 of them. Truncating a mapped file in place ends the processes that map it; viewsphere
+itself only replaces and deletes files.
 """
 
 LINE = 64
@@ -42,13 +42,15 @@ LINE = 64
 _DIGEST_BYTES, _LENGTH_BYTES = 16, 8
 _START = len(MAGIC) + _DIGEST_BYTES
 _NUMBERS = re.compile("[<>|][biuf][1248]")
-"""numpy's names of dtypes that arrays may have: what it makes of other texts is not foreseen."""
+"""numpy's names of the dtypes that arrays may have. Other texts are rejected, since numpy might interpret them in unforeseen
+ways.
+"""
 
 Arrays = Mapping[str, NDArray[Any]]
 
 
 class DamagedError(ValueError):
-    """A file that is not whole, or not of this format."""
+    """A file that is incomplete or has another format."""
 
 
 @dataclass(frozen=True)
@@ -60,7 +62,7 @@ class Content:
 
 
 def write_arrays(file: Path, about: Any, arrays: Arrays) -> int:
-    """Write a new file, and return the number of its bytes. Raises OSError as writing does."""
+    """Write a new file, and return its size in bytes. Raises OSError if writing fails."""
     blocks = {name: np.ascontiguousarray(values) for name, values in arrays.items()}
     head = _head(about, blocks)
     digest = xxhash.xxh3_128(head)
@@ -77,7 +79,7 @@ def write_arrays(file: Path, about: Any, arrays: Arrays) -> int:
 
 
 def read_arrays(file: Path) -> Content:
-    """The content of a file. Raises DamagedError for a file that is not whole, OSError as opening does."""
+    """The content of a file. Raises DamagedError for an incomplete file and OSError if it cannot be opened."""
     with open_file(file) as stream:
         whole = _mapped(stream, file)
     if bytes(whole[: len(MAGIC)]) != MAGIC or len(whole) < _START + _LENGTH_BYTES:
@@ -122,15 +124,15 @@ def _array(data: memoryview, dtype: str, shape: list[int], at: int) -> NDArray[A
 
 
 def number_type(name: str) -> np.dtype[Any]:
-    """The dtype of numbers that has this name; raises ValueError for others, and TypeError for what is no text."""
+    """The numeric dtype of this name. Raises ValueError for any other name, and TypeError if the name is not a string."""
     if not _NUMBERS.fullmatch(name):
         raise ValueError(f"numbers of type {name!r}")
     return np.dtype(name)
 
 
 def _mapped(stream: BufferedReader, file: Path) -> memoryview:
-    """Return all bytes of a file. A large file is mapped, and copied on write: processes share its memory. A file of another
-    machine is read, since that machine may delete it, which would end a process that maps it.
+    """Return all bytes of a file. A large file is mapped, and copied on write: processes share its memory. A file on another
+    machine is read instead: if that machine deleted it, a process that maps it would end.
     """
     size = os.fstat(stream.fileno()).st_size
     if size >= MAPPED_BYTES and is_local(file):

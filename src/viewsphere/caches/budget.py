@@ -1,6 +1,6 @@
 """The limit of the cache: the entries that were used longest ago are deleted.
 
-No lock is needed. Two processes that prune at once delete the same entries, and an entry that is gone is made again.
+No lock is needed. Two processes that prune at once delete the same entries, and a deleted entry is recreated when needed.
 """
 
 from __future__ import annotations
@@ -22,23 +22,25 @@ KEPT_SHARE = 0.9
 """Share of the limit that pruning leaves, so that the next entries need no further pruning."""
 
 CHECKED_SHARE = 1 / 32
-"""Share of the limit that all processes write between two looks at the whole cache: a look takes 2 ms for 1,000 entries."""
+"""Share of the limit that all processes together write between two scans of the whole cache. A scan takes 2 ms for 1,000
+entries.
+"""
 
 LEDGER = "written"
-"""A file of the cache that says how much was written since the last look: its length, in units of `UNIT` of the limit."""
+"""A cache file whose length records how much was written since the last scan, in units of `UNIT` of the limit."""
 
 UNIT = 1 / 4096
 
 KERNELS, KERNELS_S = "kernels", 30 * 86_400.0
-"""The kind that is deleted last, unless it was not used for so many seconds: it is small beside light and takes long to make,
-and workers read it again hours after a run has begun.
+"""The kind that is deleted last, unless unused for this many seconds. Kernels are small compared to light and slow to make, and
+workers read them again hours after a run has begun.
 """
 
 READ_BY_PATH = frozenset({".glb"})
 """Endings of files that others open by their path, so that pruning spares the ones in use."""
 
 SPARED_S = 1200.0
-"""Seconds after its last use in which such a file counts as in use: twice `entries.RECENT_S`."""
+"""Seconds after its last use during which such a file counts as in use: twice `entries.RECENT_S`."""
 
 
 @dataclass(frozen=True)
@@ -52,7 +54,7 @@ class Entry:
 
 
 def entries(kinds: Iterable[str] = tuple(KINDS)) -> Iterator[Entry]:
-    """Yield the whole files of these kinds."""
+    """Yield the complete files of these kinds."""
     for kind in kinds:
         for folder, folders, names in os.walk(cache_of(kind)):
             folders[:] = (name for name in folders if "~" not in name)  # without the scratch folders of unfinished entries
@@ -67,8 +69,8 @@ def entries(kinds: Iterable[str] = tuple(KINDS)) -> Iterator[Entry]:
 def make_room(size: int) -> None:
     """Count the bytes of an entry that is about to appear, and prune the cache once enough was written since the last look.
 
-    Bytes count before they are there, and whichever process writes them: so neither many short processes nor killed ones
-    outgrow the limit. Raises OSError where the cache cannot be written.
+    Bytes are counted before they are written, for all processes together: neither many short processes nor killed ones exceed
+    the limit. Raises OSError if the cache cannot be written.
     """
     if _is_look_due(size):
         held = sum(entry.size for entry in entries()) + size
@@ -77,7 +79,7 @@ def make_room(size: int) -> None:
 
 
 def _is_look_due(size: int) -> bool:
-    """True if a `CHECKED_SHARE` has been written; then the ledger begins anew."""
+    """True if a `CHECKED_SHARE` has been written; then the ledger restarts."""
     units = min(int(size / (limits.CACHE_LIMIT * UNIT)) + 1, int(1 / UNIT))
     # Appending is atomic: no lock is needed. Where machines share the folder, they may count too little at times.
     further = getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0)
@@ -94,10 +96,10 @@ def _is_look_due(size: int) -> bool:
 
 
 def prune(limit: int) -> list[Entry]:
-    """Delete the entries that were used longest ago, kernels last, until the others have at most `limit` bytes; return the
-    deleted ones.
+    """Delete the entries that were used longest ago, kernels last, until the remaining ones hold at most `limit` bytes. Return
+    the deleted entries.
 
-    An entry whose time lies in the future, as after a jump of the clock, counts as the oldest.
+    An entry with a time in the future, such as after a clock change, counts as the oldest.
     """
     _sweep_all()
     now = time.time() + 60  # machines that share a cache differ by some seconds
@@ -111,7 +113,7 @@ def prune(limit: int) -> list[Entry]:
 
 
 def takes(size: int) -> bool:
-    """True if an entry of so many bytes leaves room for others: a larger one would drive all of them out."""
+    """True if an entry of this many bytes leaves room for others. A larger one would displace all of them."""
     return size <= limits.CACHE_LIMIT * KEPT_SHARE
 
 
@@ -139,7 +141,7 @@ def _delete(chosen: Iterable[Entry]) -> list[Entry]:
 
 
 def _sweep_all() -> None:
-    """Remove folders that dead processes left."""
+    """Remove folders left behind by dead processes."""
     for kind in KINDS:
         with suppress(OSError):
             sweep(cache_of(kind))

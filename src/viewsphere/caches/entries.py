@@ -1,7 +1,7 @@
-"""Entries of the cache: written whole or not at all, checked whenever they are read, and never an error.
+"""Cache entries: written completely or not at all, checked on every read, and never a cause of errors.
 
-An entry that is damaged is deleted and made anew. Where the cache cannot be written, or its disk is full, the caller makes its
-result again in each process.
+A damaged entry is deleted and recreated. If the cache cannot be written or its disk is full, the caller recomputes its result
+in each process.
 """
 
 from __future__ import annotations
@@ -25,13 +25,13 @@ PREFIX = "entry-"
 """The prefix of folders in which entries are being written."""
 
 RECENT_S = 600.0
-"""Seconds within which a second use of an entry is not noted: noting one writes to the disk."""
+"""Seconds after a recorded use during which further uses of an entry are not recorded, since each record writes to the disk."""
 
 T = TypeVar("T")
 
 
 def kept(kind: str, digest: str, make: Callable[[], T], pack: Callable[[T], Content], unpack: Callable[[Content], T]) -> T:
-    """The result of `make`, from the cache where it has an entry of this kind and digest."""
+    """The result of `make`, read from the cache if it has an entry of this kind and digest."""
     file = cache_of(kind) / f"{digest}{SUFFIX}"
     content = read_entry(file)
     if content is not None:
@@ -44,7 +44,7 @@ def kept(kind: str, digest: str, make: Callable[[], T], pack: Callable[[T], Cont
 
 
 def read_entry(file: Path) -> Content | None:
-    """The content of an entry; None where there is none that is whole."""
+    """The content of an entry; None if it does not exist or is incomplete."""
     from viewsphere.caches.arrays import DamagedError, read_arrays
 
     try:
@@ -60,7 +60,7 @@ def read_entry(file: Path) -> Content | None:
 
 
 def write_entry(file: Path, about: Any, arrays: Arrays) -> None:
-    """Write an entry where that is possible."""
+    """Write an entry if possible."""
     from viewsphere.caches.arrays import write_arrays
 
     with suppress(OSError), making(file) as half:
@@ -69,7 +69,7 @@ def write_entry(file: Path, about: Any, arrays: Arrays) -> None:
 
 @contextmanager
 def making(file: Path) -> Generator[Path]:
-    """A path at which to write an entry's file, which appears when the block has ended; raises OSError as writing does."""
+    """A temporary path for an entry's file, which becomes visible when the block ends. Raises OSError if writing fails."""
     file.parent.mkdir(parents=True, exist_ok=True)
     sweep_once(file.parent, PREFIX, os.getpid())
     with scratch_folder(file.parent, PREFIX) as place:
@@ -80,13 +80,15 @@ def making(file: Path) -> Generator[Path]:
 
 @cache
 def sweep_once(folder: Path, prefix: str, process: int) -> None:
-    """Remove what dead processes left in a folder: the first time that a process writes there, since it lists all entries."""
+    """Remove files left by dead processes from a folder. This runs only at a process's first write, since it lists all
+    entries.
+    """
     sweep(folder, prefix)
 
 
 def publish(half: Path, file: Path) -> None:
-    """Make a whole file an entry of the cache, and keep the cache within its limit; raises OSError as renaming does. An entry
-    that alone would fill the cache is left out.
+    """Turn a complete file into a cache entry, and keep the cache within its limit. An entry that alone would fill the cache is
+    not stored. Raises OSError if renaming fails.
     """
     size = half.stat().st_size
     if budget.takes(size) or file.suffix in budget.READ_BY_PATH:
@@ -95,7 +97,7 @@ def publish(half: Path, file: Path) -> None:
 
 
 def note_use(file: Path) -> None:
-    """Note that an entry was used, as the time of its last change."""
+    """Record the use of an entry as its modification time."""
     with suppress(OSError):
         if abs(time.time() - file.stat().st_mtime) > RECENT_S:
             os.utime(file)

@@ -1,4 +1,4 @@
-"""File systems, as far as Linux lists them."""
+"""The mounted file systems that Linux lists."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ from pathlib import Path
 from viewsphere.files import read_text
 
 LOCAL = frozenset({"bcachefs", "btrfs", "ext2", "ext3", "ext4", "f2fs", "overlay", "tmpfs", "xfs", "zfs"})
-"""Types of file systems whose files only this machine changes, proc_mounts(5)."""
+"""Types of file systems, as in proc_mounts(5), whose files only this machine changes."""
 
 MOUNTS = Path("/proc/self/mounts")
 
 
 def is_local(file: Path) -> bool:
-    """True if a file lies on a file system that is known to belong to this machine alone."""
+    """True if a file is on a file system that certainly belongs to this machine alone."""
     path = os.path.realpath(file)
     best = max((mount for mount in _mounts() if _is_below(path, mount[0])), key=lambda mount: len(mount[0]), default=("", ""))
     return best[1] in LOCAL
@@ -23,7 +23,7 @@ def is_local(file: Path) -> bool:
 
 @cache
 def _mounts() -> tuple[tuple[str, str], ...]:
-    """The folder and the type of each mounted file system; none where the system lists none."""
+    """The folder and the type of each mounted file system; empty if the system lists none."""
     try:
         lines = read_text(MOUNTS, "MAX_TABLE_BYTES").splitlines()
     except (OSError, ValueError):

@@ -1,1 +1,1 @@
-"""Pixels to bytes and back: PNG, TIFF, OpenEXR, NPZ, and what Pillow and imagecodecs write."""
+"""Encoders and decoders of pixels: PNG, TIFF, OpenEXR, NPZ, and the formats of Pillow and imagecodecs."""

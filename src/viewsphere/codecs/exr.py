@@ -28,7 +28,7 @@ _FOREIGN = "EXR: expected viewsphere's own, found a damaged file or another prog
 def encode_exr(array: NDArray[Any]) -> bytes:
     """An EXR file of (H, W), as channel Z, or (H, W, 2 or 3), as channels R, G and B; float32 or int32, not empty.
 
-    EXR knows no signed integers: int32 numbers become the UINT numbers of equal bits.
+    EXR has no signed integers: int32 numbers become UINT numbers with the same bits.
     """
     components = 1 if array.ndim == 2 else array.shape[-1]
     if array.ndim not in (2, 3) or array.size == 0 or components not in _NAMES or array.dtype not in _KINDS:
@@ -65,7 +65,9 @@ def _header(width: int, height: int, components: int, kind: int) -> bytes:
 
 
 def _mixed(raw: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    """EXR's prediction: bytes at even places, then those at odd ones, each as its difference from the last, plus 128."""
+    """EXR's prediction: bytes at even indices, then bytes at odd indices, each as its difference from the previous byte, plus
+    128.
+    """
     parted = np.concatenate([raw[::2], raw[1::2]])
     parted[1:] = np.diff(parted) + np.uint8(128)
     return parted

@@ -14,7 +14,7 @@ _RATIOS = (1, Fraction(6, 5), Fraction(4, 3), Fraction(3, 2), Fraction(16, 9), F
 
 
 def qoi_size(data: bytes) -> tuple[int, int]:
-    """Width and height that a QOI file promises; raises ValueError for one that ends before."""
+    """Width and height from a QOI file's header; raises ValueError if the header is cut off."""
     if len(data) < 14:
         raise ValueError("QOI: expected 14 bytes of its head, found the file's end: it is cut off")
     width, height = struct.unpack_from(">II", data, 4)
@@ -22,7 +22,7 @@ def qoi_size(data: bytes) -> tuple[int, int]:
 
 
 def jxl_size(data: bytes) -> tuple[int, int]:
-    """Width and height that a JPEG XL file promises, bare or in boxes; raises ValueError for one without."""
+    """Width and height from a JPEG XL file's header, bare or in boxes; raises ValueError if the file has none."""
     start = 0 if data.startswith(JXL_BARE) else _codestream(data)
     if data[start : start + 2] != JXL_BARE or len(data) < start + 12:
         raise ValueError("JPEG XL: expected the size of its picture, found none: it is damaged or cut off")
@@ -50,7 +50,7 @@ class _Bits:
 
 
 def _codestream(data: bytes) -> int:
-    """Return the place where the picture begins in a file of boxes; the file's end if there is none."""
+    """Return the offset of the picture in a file of boxes; the file's end if there is none."""
     place = 0
     while place + 8 <= len(data):
         size, kind = struct.unpack_from(">I4s", data, place)

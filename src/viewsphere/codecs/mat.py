@@ -1,4 +1,4 @@
-"""MATLAB's files of version 5 (R2006b and -v7), read without more memory than their limit; scipy has none.
+"""MATLAB's files of version 5 (R2006b and -v7), read within a memory limit, which scipy does not offer.
 
 Source: MathWorks, MAT-File Format, https://www.mathworks.com/help/pdf_doc/matlab/matfile_format.pdf.
 """
@@ -22,16 +22,16 @@ DTYPES = {
 }  # fmt: skip
 MATRIX, COMPRESSED, UTF8, UTF16 = 14, 15, 16, 17
 FLAGS, SIZES, NAMES, TEXTS = (6,), (5,), (1, 2, UTF8), (1, 2, 4, UTF16, 18)
-"""Types of the elements that hold what an array is, its sizes and lengths, its names, and texts in units of 1, 2 or 4 bytes."""
+"""Types of the elements that hold an array's flags, its sizes and lengths, its names, and texts in units of 1, 2 or 4 bytes."""
 
 ENCODINGS = {1: "latin-1", 2: "utf-16-le", 4: "utf-32-le"}
 CELL, STRUCT, CHAR, FIRST_NUMBER, LAST_NUMBER = 1, 2, 4, 6, 15
 COMPLEX = 0x0800
 DEEPEST = 16
-"""Arrays within one another: each takes several calls of Python's stack."""
+"""Greatest nesting depth of arrays: each level takes several calls of Python's stack."""
 
 MOST_AXES = 32
-"""Of an array: numpy of all versions has as many."""
+"""Greatest number of axes of an array: all versions of numpy support this many."""
 
 Struct = list[dict[str, Any]]
 """A struct array, column by column."""
@@ -52,7 +52,7 @@ class _Reader:
                 raise ValueError("found a file that is cut off")
             kind, size = struct.unpack_from(self.order + "II", data, at)
             begin, step = at + TAG, size + (-size % 8 if kind != COMPRESSED else 0)
-            if kind >> 16:  # up to four bytes stand in the tag itself
+            if kind >> 16:  # up to four bytes are stored in the tag itself
                 kind, size, begin, step = kind & 0xFFFF, kind >> 16, at + 4, 0
             if size > len(data) - begin or (step == 0 and begin == at + 4 and size > 4):
                 raise ValueError("found a file that is cut off")
@@ -83,7 +83,7 @@ class _Reader:
         return name, self._text(parts, shape) if kind == CHAR else _shaped(self._next(parts), shape)
 
     def _check(self, count: int) -> None:
-        """Raise ValueError where so many more arrays are too many."""
+        """Raise ValueError if this many further arrays exceed the limit."""
         if count > self.left:
             raise ValueError(f"expected at most {limits.MAX_MAT_ARRAYS:,} arrays (limit MAX_MAT_ARRAYS); found more")
 
@@ -121,7 +121,7 @@ class _Reader:
         return [dict(zip(fields, values[i : i + len(fields)], strict=True)) for i in range(0, len(values), len(fields))]
 
     def _text(self, parts: Iterator[tuple[int, memoryview]], shape: tuple[int, ...]) -> str:
-        """A text; of several rows, one after another."""
+        """A text; several rows are joined one after another."""
         kind, data = next(parts, (0, memoryview(b"")))
         if kind == UTF8:
             return _decoded(bytes(data), "utf-8")
@@ -147,8 +147,8 @@ def _shaped(numbers: Any, shape: tuple[int, ...]) -> Any:
 def read_mat(data: bytes, most: int) -> dict[str, Any]:
     """The variables of a file by their names: arrays of numbers, texts, lists (cells) and `Struct`s.
 
-    Raises ValueError for what is no such file, for one that unpacks to more than `most` bytes, and for classes and functions,
-    sparse and complex numbers, which are not read.
+    Raises ValueError for other files and for files that unpack to more than `most` bytes. It also does for classes, functions,
+    sparse arrays and complex numbers, which are not supported.
     """
     mark = data[HEAD - 2 : HEAD]
     if mark not in (b"IM", b"MI") or data[:10] == b"MATLAB 7.3":

@@ -1,6 +1,6 @@
-"""MP4, written by the program ffmpeg in a process of its own.
+"""MP4, written by the program ffmpeg in a separate process.
 
-Pictures go to ffmpeg's standard input as Matroska, the plainest container that says for how long each of them is shown.
+Pictures go to ffmpeg's standard input as Matroska, the simplest container that stores a display duration for each of them.
 """
 
 from __future__ import annotations
@@ -27,27 +27,27 @@ Shown = tuple[NDArray[np.uint8], float]
 """A picture, and the seconds for which it is shown."""
 
 CODECS = {"libx264": ("-crf", "18"), "libopenh264": ("-b:v", "20M"), "libsvtav1": ("-crf", "24")}
-"""Encoders and their quality, of which the first that ffmpeg has is taken: H.264 plays everywhere."""
+"""Encoders and their quality settings; the first that ffmpeg has is used. H.264 plays everywhere."""
 
 THREADS = 4
-"""Of the encoder, whatever the machine: x264 writes other bytes with another number of threads."""
+"""The encoder's threads, the same on every machine: x264 writes different bytes with another number of threads."""
 
 TICKS = 90_000
-"""Least parts of a second in which an MP4 counts."""
+"""Smallest number of ticks per second in an MP4."""
 
 REPEATABLE = ("-map_metadata", "-1", "-fflags", "+bitexact", "-flags:v", "+bitexact", "-threads", str(THREADS))
-"""Neither dates nor versions in the file."""
+"""Options that keep dates and versions out of the file, so that equal pictures give equal bytes."""
 
 ANSWER_S = 60.0
 
 GRACE_S = 5.0
-"""Seconds that ffmpeg has to end by itself once it reads no more."""
+"""Seconds in which ffmpeg may exit by itself once it has stopped reading."""
 
 
 @dataclass(frozen=True)
 class Encoder:
-    """The program ffmpeg, and the name of its encoder. Errors begin with `asked`, which wants an MP4, and end with what
-    could be done `instead`.
+    """The program ffmpeg, and the name of its encoder. Errors begin with `asked`, the feature that requested an MP4, and end
+    with `instead`, an alternative.
     """
 
     program: str
@@ -57,9 +57,10 @@ class Encoder:
 
 
 def encoder(asked: str = Encoder.asked, instead: str = Encoder.instead) -> Encoder:
-    """The ffmpeg of the package imageio-ffmpeg (or that IMAGEIO_FFMPEG_EXE names), and the first of `CODECS` that it has.
+    """The ffmpeg of the package imageio-ffmpeg (or the one that IMAGEIO_FFMPEG_EXE names), with the first of `CODECS` that it
+    supports.
 
-    Raises MissingExtraError without the package, an ffmpeg that starts, or any of these encoders.
+    Raises MissingExtraError if the package, a working ffmpeg, or all of these encoders are missing.
     """
     try:
         from imageio_ffmpeg import get_ffmpeg_exe
@@ -83,10 +84,10 @@ def encoder(asked: str = Encoder.asked, instead: str = Encoder.instead) -> Encod
 
 
 def write_mp4(file: Path, shown: Iterable[Shown], by: Encoder) -> None:
-    """Write pictures of one even size (height, width, 3; uint8, sRGB) as MP4, each for exactly its time if all have one rate,
-    and to 1/90000 s if not. The same pictures are the same bytes from the same ffmpeg.
+    """Write pictures of one even size (height, width, 3; uint8, sRGB) as MP4, each shown for exactly its time if all have one
+    rate, else to 1/90000 s. The same ffmpeg turns equal pictures into equal bytes.
 
-    Raises UserError where ffmpeg cannot write them; ffmpeg has ended in any case.
+    Raises UserError if ffmpeg cannot write them. In any case, ffmpeg has ended on return.
     """
     pictures = iter(shown)
     first = next(pictures)
@@ -100,12 +101,12 @@ def write_mp4(file: Path, shown: Iterable[Shown], by: Encoder) -> None:
 
 
 def rate(seconds: float) -> Fraction:
-    """Pictures a second, each of which is shown for so many seconds: 29.97 and its like stay what they are."""
+    """Pictures per second if each is shown for this many seconds; rates such as 29.97 stay exact."""
     return Fraction(1 / seconds).limit_denominator(1001)
 
 
 def ticks(seconds: float) -> int:
-    """Parts of a second, at least `TICKS`, of which such a picture is shown for a whole number."""
+    """Ticks per second, at least `TICKS`, that make this duration a whole number of ticks."""
     whole = rate(seconds).numerator
     return whole * -(-TICKS // whole)
 
@@ -120,9 +121,9 @@ def _command(file: Path, seconds: float, by: Encoder) -> list[str]:
 
 @contextmanager
 def _started(command: list[str], said: IO[bytes]) -> Generator[tuple[subprocess.Popen[bytes], IO[bytes]]]:
-    """The process of a command, which is over afterwards, and its standard input.
+    """The process of a command and its standard input; the process has ended when the block ends.
 
-    The process is a group of its own: an interrupt from the terminal comes to this process alone, which ends the other.
+    The process has its own group: an interrupt from the terminal reaches only viewsphere, which then ends the process.
     """
     process = subprocess.Popen(
         command,
@@ -144,7 +145,7 @@ def _started(command: list[str], said: IO[bytes]) -> Generator[tuple[subprocess.
 
 
 def _fed(pipe: IO[bytes], parts: Iterator[bytes]) -> bool:
-    """Return whether a program took all parts; errors of who makes the parts are raised."""
+    """Return whether a program accepted all parts. Errors raised while making the parts propagate."""
     for part in parts:
         try:
             pipe.write(part)
@@ -172,7 +173,7 @@ def _end(code: int | None, said: IO[bytes]) -> str:
 
 
 def _matroska(first: Shown, shown: Iterable[Shown]) -> Iterator[bytes]:
-    """As much of Matroska as ffmpeg asks for, counted in nanoseconds (RFC 9559; RFC 8794 for the elements)."""
+    """The minimal Matroska that ffmpeg accepts, with times in nanoseconds (RFC 9559; RFC 8794 for the elements)."""
     height, width = first[0].shape[:2]
     size = _element("B0", _number(width)) + _element("BA", _number(height)) + _element("2EB524", b"RGB\x18")
     kind = _element("D7", _number(1)) + _element("73C5", _number(1)) + _element("83", _number(1))

@@ -29,7 +29,7 @@ def encode_npz(array: NDArray[Any], name: str) -> bytes:
     head = io.BytesIO()
     np.lib.format.write_array_header_1_0(head, np.lib.format.header_data_from_array_1_0(array))
     header = head.getvalue()
-    first = struct.pack("<BHH", 0, len(header), len(header) ^ 0xFFFF) + header  # a stored block of its own
+    first = struct.pack("<BHH", 0, len(header), len(header) ^ 0xFFFF) + header  # a separate stored block
     stream = deflate(array)
     check = isal_zlib.crc32(array, isal_zlib.crc32(header))
     member = f"{name}.npy".encode("ascii")
@@ -43,7 +43,7 @@ def encode_npz(array: NDArray[Any], name: str) -> bytes:
 
 
 def decode_npz(data: bytes, name: str) -> NDArray[Any]:
-    """The array of this name in an archive; raises UserError where the file is damaged, without it or beyond the limit."""
+    """The array of this name in an archive; raises UserError if the file is damaged, lacks the array or exceeds the limit."""
     try:
         with zipfile.ZipFile(io.BytesIO(data)) as archive, archive.open(f"{name}.npy") as member:
             check_size(*_promised(member))
@@ -58,13 +58,13 @@ def decode_npz(data: bytes, name: str) -> NDArray[Any]:
 
 
 def load_array(file: Path) -> NDArray[Any]:
-    """The array in a .npy file that another process wrote; raises OSError and ValueError where there is none."""
+    """The array in a .npy file that another process wrote; raises OSError or ValueError if it cannot be read."""
     with open_file(file) as stream:
         return np.load(stream, allow_pickle=False)
 
 
 def _promised(member: IO[bytes]) -> tuple[int, int]:
-    """Width and height that an array promises at its head: of rows of numbers the number of the rows and 1."""
+    """Width and height from an array's header; for rows of numbers, the number of rows and 1."""
     major, _ = np.lib.format.read_magic(member)
     read = np.lib.format.read_array_header_1_0 if major == 1 else np.lib.format.read_array_header_2_0
     shape, _, _ = read(member)

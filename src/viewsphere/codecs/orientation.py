@@ -1,4 +1,4 @@
-"""EXIF's orientation, which says how a viewer is to turn a picture.
+"""EXIF's orientation, which tells a viewer how to rotate a picture.
 
 https://www.cipa.jp/std/documents/e/DC-008-2012_E.pdf, section 4.6.4 A.
 """
@@ -18,7 +18,7 @@ _TAG = 0x0112
 
 
 def orientation(picture: Image) -> int:
-    """A picture's orientation, 1 to 8; 1 where there is none that can be read."""
+    """A picture's orientation, 1 to 8; 1 if none can be read."""
     try:
         found = int(picture.getexif().get(_TAG, UPRIGHT))
     except Exception:  # the parser of a damaged block may raise anything

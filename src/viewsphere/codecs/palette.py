@@ -11,7 +11,8 @@ MOST_COLORS = 256
 def palette() -> NDArray[np.uint8]:
     """The 256 distinct colours (256, 3) of PASCAL VOC, id 0 being black.
 
-    The lowest three bits of an id become the highest bits of red, green and blue, the next three bits the next highest ones.
+    The lowest three bits of an id become the highest bits of red, green and blue, and the next three bits become the next
+    highest ones.
     """
     ids = np.arange(MOST_COLORS)
     bits = ids[:, None] >> np.arange(8) & 1

@@ -15,7 +15,7 @@ from viewsphere.errors import MissingExtraError
 
 Picture = NDArray[np.uint8]
 
-JPEG_QUALITY = 95  # Pillow's highest recommended quality: more bytes beyond it show no difference
+JPEG_QUALITY = 95  # Pillow's highest recommended quality: higher ones take more bytes without a visible difference
 _QOI_END = bytes(7) + b"\1"  # https://qoiformat.org/qoi-specification.pdf
 EFFORT = 1
 """JPEG XL's fastest lossless effort; higher ones take ten times as long to save a tenth of the size."""
@@ -25,7 +25,7 @@ def encode_picture(array: Picture, kind: str, quality: int | None) -> bytes:
     """A `jpeg`, `webp`, `qoi` or `jxl` file of a picture (H, W, 3), or (H, W, 4) except for JPEG; uint8 sRGB.
 
     `quality` (1 to 100) makes WebP and JPEG XL lossy; JPEG's is 95 by default, and its colour is not subsampled. Raises
-    MissingExtraError where the codec is not installed.
+    MissingExtraError if the codec is not installed.
     """
     array = np.ascontiguousarray(array)
     match kind:
@@ -70,7 +70,7 @@ def decode_picture(data: bytes, components: int) -> Picture:
         check_size(*jxl_size(data))
         return _decoded("JPEG XL", "jpegxl_decode", data, components)
     with opened(io.BytesIO(data)) as image:
-        if image.mode.startswith("I"):  # 16 bits of grey, which Pillow would cut off above 255
+        if image.mode.startswith("I"):  # 16 bits of grey, which Pillow would clip to 255
             grey = Image.fromarray((np.asarray(image) >> 8).astype(np.uint8))
             return np.asarray(grey.convert("RGBA" if components == 4 else "RGB"))
         return np.asarray(image.convert("RGBA" if components == 4 else "RGB"))
@@ -87,7 +87,7 @@ def _decoded(kind: str, function: str, data: bytes, components: int) -> Picture:
 
 
 def codecs(kind: str) -> ModuleType:
-    """The package imagecodecs; raises MissingExtraError where it is not installed."""
+    """The package imagecodecs; raises MissingExtraError if it is not installed."""
     try:
         import imagecodecs
     except ImportError:

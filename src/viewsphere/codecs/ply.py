@@ -9,11 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 TYPES = {"f4": "float", "f8": "double", "u1": "uchar", "i4": "int"}
-"""PLY's names of numpy's types."""
+"""PLY's names for numpy's types."""
 
 
 def ply_head(kind: np.dtype[Any], count: int, comments: Iterable[str] = ()) -> bytes:
-    """The head of a file of so many vertices, whose properties are the fields of a structured dtype."""
+    """The header of a file of this many vertices; the fields of a structured dtype are their properties."""
     head = ["ply", "format binary_little_endian 1.0", *(f"comment {line}" for line in comments), f"element vertex {count}"]
     head += [f"property {TYPES[kind[name].str[1:]]} {name}" for name in kind.names or ()]
     return "\n".join([*head, "end_header\n"]).encode("ascii")

@@ -1,4 +1,4 @@
-"""Arrays to image files and back, in memory: lossless PNG and TIFF, fast and always the same bytes.
+"""Arrays to image files and back, in memory: lossless PNG and TIFF, fast and byte-for-byte reproducible.
 
 Deflate is ISA-L's (`deflate`), an order of magnitude faster than zlib at PNG's usual level. The readers read only
 files that the writers made; other tools read the files too (Pillow, OpenCV, tifffile, imageio).
@@ -40,7 +40,7 @@ def encode_png(
     """A PNG file of a picture: (H, W) bool (1 bit), uint8 or uint16, or (H, W, 3 or 4) uint8 or uint16, not empty.
 
     With a `palette` (n, 3), (H, W) uint8 are indices of its colours. `unit` is the length in metres of one step of (H, W)
-    (pCAL). Of a `rendered` picture with colours of 8 bits only runs are matched, which takes half the time.
+    (pCAL). For a `rendered` picture with 8-bit colours, only runs are matched, which halves the time.
     """
     components = 1 if array.ndim == 2 else array.shape[-1]
     dtypes = (np.bool_, np.uint8, np.uint16) if array.ndim == 2 else (np.uint8, np.uint16)
@@ -64,7 +64,7 @@ def encode_png(
 
 
 def _filtered(array: NDArray[Any], components: int) -> NDArray[np.uint8]:
-    """The scan lines, each after the number of its filter: Sub for bytes, None for bits and for 16-bit ids."""
+    """The filtered scan lines, each preceded by the filter's number: Sub for bytes, None for bits and for 16-bit ids."""
     height = len(array)
     if array.dtype == np.bool_:
         rows = np.packbits(array, axis=1)
@@ -113,13 +113,13 @@ def decode_png(data: bytes) -> NDArray[Any]:
 
 
 def check_png(data: bytes) -> None:
-    """Raise UserError where a PNG file, of whatever program, is damaged: every chunk carries a checksum."""
+    """Raise UserError if a PNG file of any program is damaged: every chunk has a checksum."""
     if not any(kind == b"IEND" for kind, _ in _chunks(data)):
         raise UserError("PNG: expected its last chunk, found the file's end: it is cut off")
 
 
 def png_unit(data: bytes) -> float | None:
-    """Metres in a step of a PNG file's numbers, None where the file has no unit; raises UserError as `decode_png` does."""
+    """Metres in a step of a PNG file's numbers, None if the file has no unit; raises UserError as `decode_png` does."""
     for kind, content in _chunks(data):
         if kind == b"pCAL":
             name, _, rest = content.partition(b"\0")
@@ -185,7 +185,7 @@ def _inflated(body: bytes, expected: int, kind: str) -> bytes:
 def encode_tiff(array: NDArray[Any]) -> bytes:
     """A TIFF file of numbers: (H, W) or (H, W, 1..3), float32 or int32, not empty; inf and NaN are kept.
 
-    One strip, deflate, little-endian, no predictor: any reader of 32-bit TIFF takes it.
+    One strip, deflate, little-endian, no predictor: any reader of 32-bit TIFF can read it.
     """
     components = 1 if array.ndim == 2 else array.shape[-1]
     if array.ndim not in (2, 3) or array.size == 0 or components not in (1, 2, 3) or array.dtype not in _SAMPLE_FORMATS:
@@ -204,7 +204,7 @@ def _tiff_head(height: int, width: int, components: int, dtype: np.dtype[Any], s
 
 @lru_cache(maxsize=16)
 def _tiff_layout(height: int, width: int, components: int, dtype: np.dtype[Any]) -> bytes:
-    """The head of a strip of no bytes: equal for all files of one shape."""
+    """The header for a strip of no bytes: the same for all files of one shape."""
     tags = {
         _WIDTH: ("I", [width]),
         _HEIGHT: ("I", [height]),
@@ -225,7 +225,7 @@ def _tiff_layout(height: int, width: int, components: int, dtype: np.dtype[Any])
 
 
 def _directory(tags: dict[int, tuple[str, list[int]]]) -> bytes:
-    """The image file directory, made to stand at byte 8; values that do not fit into an entry follow the directory."""
+    """The image file directory, for byte 8 of the file; values that do not fit into an entry follow the directory."""
     beyond = 8 + 2 + 12 * len(tags) + 4
     entries, values = b"", b""
     for tag, (code, numbers) in sorted(tags.items()):

@@ -1,4 +1,4 @@
-"""The most pixels of a picture or map that is stored in a data set, or imported into one."""
+"""The pixel limit of pictures and maps that are stored in a data set or imported into one."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 def check_size(width: int, height: int) -> None:
-    """Raise UserError for a file of more pixels than the limit; to be called before its pixels are unpacked."""
+    """Raise UserError for a file of more pixels than the limit. Call this before unpacking its pixels."""
     most = limits.MAX_STORED_PIXELS
     if width * height > most:
         raise UserError(f"expected at most {most:,} pixels (limit MAX_STORED_PIXELS), found {width:,} x {height:,}; {RAISE}")
@@ -28,14 +28,14 @@ RAISE = "set VIEWSPHERE_MAX_STORED_PIXELS higher if it is meant so"
 
 @contextmanager
 def opened(file: Path | IO[bytes]) -> Generator[Image]:
-    """A picture as Pillow opens it, whose pixels are not unpacked yet; raises UserError for one beyond the limit, and Pillow's
-    OSError, ValueError or SyntaxError for a damaged one.
+    """A picture opened by Pillow, with its pixels not unpacked yet. Raises UserError if it exceeds the limit, and Pillow's
+    OSError, ValueError or SyntaxError if it is damaged.
     """
     from PIL import Image
 
     with ExitStack() as then:
         then.enter_context(warnings.catch_warnings())
-        warnings.simplefilter("ignore")  # Pillow's, of tags that it skips, would stand among our own lines
+        warnings.simplefilter("ignore")  # Pillow's warnings of skipped tags would appear among our own output
         stream = then.enter_context(open_file(file, "MAX_PICTURE_BYTES")) if isinstance(file, PurePath) else file
         limit, Image.MAX_IMAGE_PIXELS = Image.MAX_IMAGE_PIXELS, None  # Pillow has no other way; ours is checked at once
         try:
@@ -45,5 +45,5 @@ def opened(file: Path | IO[bytes]) -> Generator[Image]:
         check_size(*image.size)
         try:
             yield image
-        except Image.DecompressionBombError as error:  # what Pillow unpacks at once, as a TIFF's tile, has a limit of its own
+        except Image.DecompressionBombError as error:  # Pillow's own limit for blocks unpacked at once, such as a TIFF's tile
             raise ValueError(str(error)) from None

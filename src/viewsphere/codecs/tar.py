@@ -1,4 +1,4 @@
-"""Files in a tar (POSIX ustar): dated 1970 and of nobody, so that the same files are the same bytes."""
+"""Files in a tar (POSIX ustar), dated 1970 and without an owner, so that equal files give equal bytes."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ def head(name: str, size: int) -> bytes:
 
 
 def filling(size: int) -> bytes:
-    """Return the padding behind a file of so many bytes."""
+    """Return the padding behind a file of this many bytes."""
     return bytes(-size % tarfile.BLOCKSIZE)
 
 
 def member(name: str, data: bytes) -> bytes:
-    """A file as a tar has it."""
+    """A file as a tar member: header, data and padding."""
     return head(name, len(data)) + data + filling(len(data))
 
 

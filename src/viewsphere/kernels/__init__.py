@@ -1,1 +1,1 @@
-"""The use of numba: jit, its cache, faster compilation. This package has no code for pictures."""
+"""Kernel compilation with numba: jit, its cache, faster compilation. This package has no code for pictures."""

@@ -1,5 +1,5 @@
-"""The build of kernels: the versions and the processor that turn their sources into machine code. Found without importing
-numba, which takes long to load.
+"""The build of kernels: the versions and the processor that turn their sources into machine code. Determined without importing
+numba, which is slow to load.
 """
 
 from __future__ import annotations
@@ -13,14 +13,16 @@ from importlib.metadata import version
 import llvmlite.binding
 
 QUICKER = ("0.66", "0.67", "0.68")
-"""numba's minor versions whose internals are as `compiler` expects; with other versions `stock` compiles."""
+"""numba's minor versions whose internals match `compiler`; with other versions, `stock` compiles."""
 
 NUMBA, LLVMLITE = version("numba"), version("llvmlite")
 IS_STOCK = os.environ.get("VIEWSPHERE_STOCK_NUMBA", "0") != "0" or ".".join(NUMBA.split(".")[:2]) not in QUICKER
 """True if numba compiles kernels in its own way, as `VIEWSPHERE_STOCK_NUMBA=1` requests."""
 
 COMMON = "x86-64-v3"
-"""The processor that kernels are compiled for on x86-64. Intel's have all it needs since 2013 (Haswell), AMD's since 2015."""
+"""The processor type that kernels are compiled for on x86-64. Intel's processors support it since 2013 (Haswell), AMD's since
+2015.
+"""
 
 NEEDED = ("avx2", "bmi", "bmi2", "f16c", "fma", "lzcnt", "movbe", "popcnt", "sse4.2")
 """LLVM's names of the instructions that code for `COMMON` uses."""
@@ -28,8 +30,8 @@ NEEDED = ("avx2", "bmi", "bmi2", "f16c", "fma", "lzcnt", "movbe", "popcnt", "sse
 
 @dataclass(frozen=True)
 class Target:
-    """The processor that kernels are compiled for, by LLVM's name, and its features; those that `COMMON` needs and that this
-    machine lacks.
+    """The processor that kernels are compiled for, by LLVM's name; its features; and the features of `COMMON` that this machine
+    lacks.
     """
 
     cpu: str
@@ -49,7 +51,7 @@ class Target:
 
     @property
     def note(self) -> str:
-        """Return the reason why other machines do not have this machine's kernels; empty if they have them."""
+        """Return the reason why this machine's kernels differ from those of other machines; empty if they do not."""
         if not self.lacking:
             return ""
         return f"note: this processor, {self.cpu}, lacks {', '.join(self.lacking)}, so kernels are compiled for it alone"
@@ -67,10 +69,10 @@ TRIPLE = llvmlite.binding.get_process_triple()
 TARGET = Target.of(TRIPLE, HOST, _features(), native=os.environ.get("VIEWSPHERE_NATIVE", "0") != "0")
 
 _PYTHON = f"{sys.implementation.cache_tag}{getattr(sys, 'abiflags', '')}"
-_NUMPY = version("numpy").partition(".")[0]  # its major versions type constants differently
+_NUMPY = version("numpy").partition(".")[0]  # numpy's major versions type constants differently
 
 BUILD = (NUMBA, LLVMLITE, _PYTHON, _NUMPY, TRIPLE, TARGET.cpu, TARGET.features, IS_STOCK, os.environ.get("NUMBA_BOUNDSCHECK"))
-"""The versions and settings, besides sources, that machine code depends on."""
+"""The versions and settings that machine code depends on in addition to the sources."""
 
 PAINTER = f"{HOST}, kernels for {TARGET.cpu}, numba {NUMBA}{' stock' if IS_STOCK else ''}, llvmlite {LLVMLITE}"
-"""The processor type and the kernel build: where both are equal, pictures are equal to the last bit."""
+"""The processor type and the kernel build: if both are equal, pictures are equal to the last bit."""

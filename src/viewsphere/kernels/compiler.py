@@ -6,7 +6,7 @@ Two thirds of the compile time are Python's own, not LLVM's.
 # pyright: reportAttributeAccessIssue=false, reportPrivateUsage=false, reportMissingTypeArgument=false
 # pyright: reportUnknownMemberType=false, reportUnknownVariableType=false, reportUnknownArgumentType=false
 # pyright: reportUnnecessaryComparison=false
-# Only through its internals does numba let its users choose the passes and their order.
+# numba lets its users choose the passes and their order only through its internals.
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ from viewsphere.kernels.numba_target import jit
 
 @register_pass(mutates_CFG=True, analysis_only=False)
 class Lifetimes(IRLegalization):
-    """Marks where variables end only where that frees memory: numba marks the end of every variable, for LLVM to remove it."""
+    """Marks the end of a variable only if that frees memory. numba marks the end of every variable, which LLVM then removes."""
 
     _name = "lifetimes"
 
@@ -74,7 +74,7 @@ PASSES = (
     NativeLowering,
     NoPythonBackend,
 )
-"""numba's passes, without those for closures, `with`, `literally`, raising computed errors, and whole-array expressions."""
+"""numba's passes except for closures, `with`, `literally`, raising computed errors, and whole-array expressions."""
 
 _PLAIN = (types.Number, types.Boolean, types.Array, types.BaseTuple)
 _resolve = BaseFunction.get_call_type
@@ -86,7 +86,9 @@ def _resolved(function: Any, context: Any, args: tuple[Any, ...], _how: tuple[An
 
 
 def _resolve_once(function: Any, context: Any, args: tuple[Any, ...], kws: dict[str, Any]) -> Any:
-    """numba's signature of a function for these types; kept, since numba would try all overloads at every call again."""
+    """numba's signature of a function for these types. It is cached, since numba would otherwise try all overloads at every
+    call.
+    """
     if kws or not all(isinstance(arg, _PLAIN) for arg in args):
         return _resolve(function, context, args, kws)
     flags = ConfigStack().top()
@@ -107,7 +109,7 @@ _post_process = PostProcessor.run
 
 
 def _tidy(self: PostProcessor, emit_dels: bool = False, extend_lifetimes: bool = False) -> None:
-    """Put blocks in order, and find where variables live only when asked; numba would do so after every pass."""
+    """Order the blocks, and compute variable lifetimes only on request; numba would do so after every pass."""
     if emit_dels:
         _post_process(self, emit_dels, extend_lifetimes)
     else:
@@ -124,7 +126,7 @@ _QUICKER = (
 
 @contextmanager
 def _quickly() -> Generator[None]:
-    """Meanwhile types are resolved once, numba's functions become parts like ours, and no garbage is collected."""
+    """A context in which types are resolved once, numba's functions become parts like ours, and no garbage is collected."""
     with global_compiler_lock, pause_collection(), ExitStack() as then:
         for owner, name, quicker in _QUICKER:
             then.callback(setattr, owner, name, getattr(owner, name))
@@ -144,7 +146,7 @@ class _Whole(JITCodeLibrary):
 
 
 class _Part(_Whole):
-    """Code that is neither optimized nor translated by itself: its callers do both, for all of their parts at once."""
+    """Code that is neither optimized nor translated separately: its callers do both for all of their parts at once."""
 
     def finalize(self) -> None:
         for library in dict.fromkeys(self._linking_libraries):
@@ -182,7 +184,7 @@ class Part(Kernel):
         state.library = _Part(state.targetctx.codegen(), func.__qualname__)
         state.flags.no_compile = True
         made = CompilerBase.compile_extra(self, func)
-        # numba knows an overload by this function object, which is never called.
+        # numba identifies an overload by this function object, which is never called.
         key = _dynfunc.make_function(made.fndesc.lookup_module(), func.__name__, "", 0, made.environment, (made.library,))
         state.targetctx.insert_user_function(key, made.fndesc, [made.library])
         return made._replace(entry_point=key)
@@ -193,12 +195,12 @@ PART: dict[str, Any] = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True, "p
 
 
 def whole(function: Callable[..., Any], **options: Any) -> Any:
-    """The kernel that compiles a function, cached; allocates no arrays unless `_nrt`."""
+    """A function compiled as a kernel and cached; it allocates no arrays unless `_nrt`."""
     how: dict[str, Any] = {"no_cfunc_wrapper": True, "pipeline_class": Kernel, "_nrt": False, **options}
     return jit(**how, cache=True)(function)
 
 
 def part(function: Callable[..., Any], **options: Any) -> Any:
-    """The part of kernels that compiles a function; it allocates no arrays unless `_nrt`, and Python cannot call it."""
+    """A function compiled as a part of kernels; it allocates no arrays unless `_nrt`, and Python cannot call it."""
     how: dict[str, Any] = {**PART, "_nrt": False, **options}
     return jit(**how)(function)

@@ -20,7 +20,7 @@ _COMPILER = tuple(_HERE / f"{name}.py" for name in ("jit", "stock", "compiler", 
 
 @cache
 def sources_digest(file: str) -> str:
-    """A digest of all that the code of a file's kernels depends on.
+    """A digest of all sources that the code of a file's kernels depends on.
 
     numba's own cache misses changes in functions that a kernel calls from another file.
     """
@@ -57,7 +57,7 @@ def _named(source: Path) -> tuple[str, bytes]:
 
 
 def _sources(file: Path) -> frozenset[Path]:
-    """A kernel's file, the files of the kernels it can reach, and those from which these import their constants."""
+    """A kernel's file, the files of all kernels that it can reach, and the files from which they import constants."""
     reached, waiting = {file}, [file]
     while waiting:
         for name in _IMPORT.findall(read_text(waiting.pop())):

@@ -1,9 +1,9 @@
-"""Files of compiled kernels, found by what they were compiled from: neither the place nor the time of a source matters.
+"""Files of compiled kernels, identified by the content of their sources: neither the path nor the date of a source matters.
 
     <kernels>/<digest of sources and build>/<kernel>-<digest of its types>.kernel
 
-An entry holds a pickle, which could run any program. So entries are loaded from the package itself, and from folders that no
-other user can write. A digest at an entry's head finds those that are not whole; they are compiled anew.
+An entry holds a pickle, which could run any program. So entries are loaded only from the package itself and from folders that
+no other user can write. A digest at an entry's start detects incomplete entries; these are compiled again.
 """
 
 from __future__ import annotations
@@ -26,23 +26,25 @@ from viewsphere.caches.entries import note_use
 from viewsphere.scratch import STALE_S
 
 SHIPPED = Path(__file__).with_name("shipped")
-"""Entries that wheels bring; sources have none."""
+"""The folder of entries that wheels include; source distributions have none."""
 
 SUFFIX = ".kernel"
 _DIGEST = hashlib.sha256().digest_size
 _OPEN = os.O_RDONLY | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_CLOEXEC", 0)
-_LEVEL = 6  # 4.1 MB of a frame's kernels become 1.5; a faster level saves nothing beside compiling
+_LEVEL = 6  # 4.1 MB of a frame's kernels become 1.5; a faster level saves little compared to compiling
 
 
 def kernel_folder() -> Path:
-    """Return the folder of compiled kernels: `$NUMBA_CACHE_DIR`, `$VIEWSPHERE_CACHE/kernels`, or in the user's cache folder."""
+    """Return the folder of compiled kernels: `$NUMBA_CACHE_DIR`, `$VIEWSPHERE_CACHE/kernels`, or a folder in the user's cache
+    folder.
+    """
     if os.environ.get("NUMBA_CACHE_DIR"):
         return Path(os.environ["NUMBA_CACHE_DIR"])
     return cache_of("kernels")
 
 
 def folders() -> tuple[Path, ...]:
-    """The folders where entries are looked for and written: a temporary one, too, where the first one cannot be written."""
+    """The folders in which entries are searched and written, with a temporary one if the first cannot be written."""
     first = kernel_folder()
     if _make(first):
         return (first,)
@@ -50,7 +52,7 @@ def folders() -> tuple[Path, ...]:
 
 
 def load(name: str) -> bytes | None:
-    """The content of the entry of this name, None where there is none that is whole and can be trusted."""
+    """The content of the entry of this name, None if it is missing, incomplete or not trusted."""
     for folder in (SHIPPED, *folders()):
         data = _read(folder, name)
         if data is not None and hashlib.sha256(data[_DIGEST:]).digest() == data[:_DIGEST]:
@@ -61,7 +63,7 @@ def load(name: str) -> bytes | None:
 
 
 def save(name: str, content: bytes) -> None:
-    """Keep an entry where that is possible; others see it whole or not at all, however many write it at once."""
+    """Store an entry if possible. Other processes see it completely or not at all, even if several write it at once."""
     packed = zlib.compress(content, _LEVEL)
     data = hashlib.sha256(packed).digest() + packed
     for folder in folders():
@@ -72,12 +74,12 @@ def save(name: str, content: bytes) -> None:
 
 
 def has(name: str) -> bool:
-    """True if an entry of this name, whole or damaged, lies where `load` looks."""
+    """True if an entry of this name, complete or damaged, is in a folder that `load` searches."""
     return any(_is_trusted(folder, name) and os.access(folder / name, os.R_OK) for folder in (SHIPPED, *folders()))
 
 
 def is_private(about: os.stat_result) -> bool:
-    """True if only this user and root can write a file or folder, as far as the system has owners."""
+    """True if only this user and root can write a file or folder; always True on systems without file owners."""
     return _is_owned(about) and (not hasattr(os, "geteuid") or not about.st_mode & (S_IWGRP | S_IWOTH))
 
 
@@ -86,7 +88,7 @@ def _is_owned(about: os.stat_result) -> bool:
 
 
 def _read(folder: Path, name: str) -> bytes | None:
-    """The bytes of a file that can be trusted. Owner and mode are those of the open file, so that nobody can exchange it."""
+    """The bytes of a trusted file. Owner and mode are checked on the open file, so that nobody can swap it meanwhile."""
     try:
         if not _is_trusted(folder, name):
             return None
@@ -117,7 +119,7 @@ def _is_own(folder: Path) -> bool:
 
 @cache
 def _warn(folder: Path) -> None:
-    """Say once, in a run's first process, that a folder's kernels are not loaded."""
+    """Warn once, in a run's first process, that a folder's kernels are not loaded."""
     if multiprocessing.parent_process() is None:
         problem = f"{folder}: others can write this folder, so that kernels in it are not used and are compiled elsewhere"
         sys.stderr.write(f"warning: {problem}. Allow it to yourself alone: chmod 700 {folder}\n")
@@ -149,7 +151,7 @@ def _write(file: Path, data: bytes) -> None:
 
 
 def _sweep(folder: Path) -> None:
-    """Remove what killed processes were writing long ago."""
+    """Remove old unfinished files of killed processes."""
     for left in folder.glob(f"*/.*{SUFFIX}.*"):
         with suppress(OSError):
             if left.stat().st_mtime < time.time() - STALE_S:

@@ -1,4 +1,4 @@
-"""Python's garbage collection, paused or spared."""
+"""Python's garbage collection: pausing it and exempting imports from it."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ from contextlib import contextmanager
 from contextvars import ContextVar
 
 _spares = ContextVar("_spares", default=False)
-"""Whether this process is viewsphere's own. (`gc.get_freeze_count` would say so as well, but counts for 10 ms.)"""
+"""True if this process is viewsphere's own. (`gc.get_freeze_count` would show it as well, but takes 10 ms.)"""
 
 
 @contextmanager
 def pause_collection() -> Generator[None]:
-    """Collect no garbage while the context lasts: among millions of living objects this would take a quarter of the time."""
+    """Collect no garbage within the context: with millions of live objects, collections would take a quarter of the time."""
     collects = gc.isenabled()
     gc.disable()
     try:
@@ -25,9 +25,11 @@ def pause_collection() -> Generator[None]:
 
 @contextmanager
 def importing() -> Generator[None]:
-    """Import modules without collections, which find no garbage: they took 0.1 of the 1.3 CPU-seconds of one picture.
+    """Import modules without garbage collections, which would find nothing: they took 0.1 of the 1.3 CPU-seconds of one
+    picture.
 
-    In viewsphere's own processes, which call `spare_imports` at their start, later collections skip all that lives by then.
+    In viewsphere's own processes, which call `spare_imports` at their start, later collections skip all objects that exist by
+    then.
     """
     with pause_collection():
         yield
@@ -36,5 +38,5 @@ def importing() -> Generator[None]:
 
 
 def spare_imports() -> None:
-    """Let later collections in this process skip what `importing` leaves, even if part of it should become garbage."""
+    """Let later collections in this process skip the objects left by `importing`, even if some become garbage."""
     _spares.set(True)

@@ -1,4 +1,4 @@
-"""numba as every kernel uses it: with `compiler` for versions of numba that it is tested with, else with `stock`."""
+"""The decorators of all kernels: they use `compiler` for the numba versions that it supports, else `stock`."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _EXACT: dict[str, Any] = {"nogil": True, "error_model": "numpy"}
 def njit(function: Callable[..., Any] | None = None, **options: Any) -> Any:
     """`numba.njit` as every kernel uses it: no GIL, cached, numpy's division, exact unless `fastmath` is given.
 
-    Kernels that allocate arrays need `_nrt`; others go without, since counting references to arrays takes long to compile.
+    Kernels that allocate arrays need `_nrt`. Others omit it, since reference counting of arrays is slow to compile.
     """
     if function is None:
         return partial(njit, **options)
@@ -29,7 +29,8 @@ def njit(function: Callable[..., Any] | None = None, **options: Any) -> Any:
 def inner(function: Callable[..., Any] | None = None, **options: Any) -> Any:
     """`njit` for functions that only kernels call: a part of each such kernel, neither optimized nor cached by itself.
 
-    Optimizing would take most of the time. Python cannot call a part, and it allocates no arrays unless `_nrt`.
+    Optimizing each part would take most of the compile time. Python cannot call a part, and a part allocates no arrays unless
+    `_nrt`.
     """
     if function is None:
         return partial(inner, **options)

@@ -1,4 +1,4 @@
-"""Arithmetic on the processor's vectors, written as on single numbers, for kernels that treat all samples of a block alike.
+"""Vector arithmetic written like scalar code, for kernels that treat all samples of a block alike.
 
 A function decorated with `lanewise` is called from kernels like any other. Its operations become vector instructions directly:
 numba need not infer their types, which takes most of a kernel's compile time, and vectorisation does not depend on heuristics.
@@ -17,7 +17,7 @@ from numba.core import cgutils
 from numba.extending import intrinsic
 
 FAST = {"contract", "arcp", "nsz", "afn", "reassoc"}
-"""The compiler's liberties with colours."""
+"""LLVM's fast-math flags for arithmetic on colours."""
 
 LANES = 8
 WHOLE, REAL, FLAG = ir.IntType(32), ir.FloatType(), ir.IntType(1)
@@ -25,7 +25,7 @@ _FLAGS = tuple(sorted(FAST))
 
 
 class Lanes:
-    """Numbers side by side: float32, int32, or the flags of a comparison. The other operand may be one number for all lanes."""
+    """A vector of numbers: float32, int32, or the flags of a comparison. The other operand may be one number for all lanes."""
 
     fast = _FLAGS
 
@@ -149,7 +149,7 @@ class Lanes:
 
 
 class Strict(Lanes):
-    """Lanes whose results, also those with other lanes, are rounded one by one, as those of single numbers are."""
+    """Lanes whose results, even when combined with other lanes, are rounded one by one, as in scalar arithmetic."""
 
     fast = ()
 
@@ -181,22 +181,22 @@ def size(a: Lanes) -> Lanes:
 
 
 def floor(a: Lanes) -> Lanes:
-    """The greatest integer that is not greater, as float32."""
+    """The greatest integer not above the value, as float32."""
     return a.call("floor")
 
 
 def sign(a: Lanes) -> Lanes:
-    """1 where not negative, else -1."""
+    """1 where the value is not negative, else -1."""
     return where(a >= 0, 1, -1)
 
 
 def clamp(a: Lanes) -> Lanes:
-    """Between 0 and 1."""
+    """The value clamped to [0, 1]."""
     return least(most(a, 0), 1)
 
 
 def dot(a: tuple[Lanes, ...], b: tuple[Lanes, ...]) -> Lanes:
-    """The scalar product of vectors of three."""
+    """The scalar product of two 3-vectors."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
@@ -238,7 +238,7 @@ def _pointer(builder: ir.IRBuilder, data: Any, at: Any, count: int) -> Any:
 class Rows:
     """An array of rows; [row] reads the lanes from `row + i` on, [row, shift] those from `row + shift + i` on.
 
-    Where `kept` flags are given, writing changes only lanes whose flag is set.
+    If `kept` flags are given, writing changes only lanes whose flag is set.
     """
 
     def __init__(self, builder: ir.IRBuilder, data: Any, i: Any, kept: Lanes | None) -> None:
@@ -281,8 +281,8 @@ def lanewise(function: Callable[..., None] | None = None, *, exact: bool = False
     """Make a function of rows and numbers callable from kernels, with a count before its arguments: it runs for that many
     samples, or a few more, up to whole vectors.
 
-    Arrays are passed as Rows, numbers of float32 as Lanes, unsigned ones as row numbers. With `exact`, rows keep what they have
-    beyond the count.
+    Arrays are passed as Rows, numbers of float32 as Lanes, unsigned ones as row numbers. With `exact`, the elements of rows
+    beyond the count keep their values.
     """
     if function is None:
         return partial(lanewise, exact=exact)

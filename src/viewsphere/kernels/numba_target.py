@@ -1,14 +1,14 @@
-"""numba's view of the processor that kernels are compiled for, beside its own, which the user's functions keep.
+"""A numba target for the processor that kernels are compiled for, separate from numba's own target for the user's functions.
 
-A target of its own (numba.core.target_extension) has its own compiled parts, types and machine code, so that nothing of it
-shows in a function that the user compiles, before, after or at the same time.
+A separate target (numba.core.target_extension) has its own compiled parts, types and machine code. So it never affects a
+function that the user compiles, whether before, after or at the same time.
 """
 
 # pyright: reportAttributeAccessIssue=false, reportPrivateUsage=false, reportMissingTypeArgument=false
 # pyright: reportUnknownMemberType=false, reportUnknownVariableType=false, reportUnknownArgumentType=false
 # pyright: reportUnnecessaryComparison=false, reportIncompatibleMethodOverride=false, reportCallIssue=false
 # pyright: reportIncompatibleVariableOverride=false
-# numba documents targets by an example alone, and its stubs know none.
+# numba documents targets only by an example, and its stubs omit them.
 
 from __future__ import annotations
 
@@ -39,11 +39,11 @@ _ANNOTATION = 5  # its place among `CompileResult._reduce`'s values behind the l
 
 
 class ViewsphereCPU(CPU):
-    """The kind of target; all that numba offers for its own CPU target applies here, too."""
+    """The kind of target; everything that numba offers for its own CPU target also applies here."""
 
 
 class _Loaded(JITCodeLibrary):
-    """Machine code from the cache, without what others would need to link it; its symbols are not listed: half the time."""
+    """Machine code from the cache, without the data for linking it. Its symbols are not listed, which halves the load time."""
 
     @classmethod
     def _unserialize(cls, codegen: Any, state: Any) -> Any:
@@ -60,7 +60,7 @@ class _Loaded(JITCodeLibrary):
 
 
 class _Codegen(JITCPUCodegen):
-    """Machine code for `TARGET`, whatever numba's settings say of the processor."""
+    """Machine code for `TARGET`, regardless of numba's processor settings."""
 
     def _get_host_cpu_name(self) -> str:
         return TARGET.cpu
@@ -100,7 +100,9 @@ class _KernelCache(_Cache):
         return str(entries.kernel_folder())
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
-        """The compiled function for these types, None if there is none; numba's preparation for compiling takes a second."""
+        """The compiled function for these types, None if there is none. This skips numba's preparation for compiling, which
+        takes a second.
+        """
         name = self._name(sig)
         content = entries.load(name)
         if content is None:
@@ -108,13 +110,13 @@ class _KernelCache(_Cache):
         rtsys.initialize(target_context)
         try:
             loaded = CompileResult._rebuild(target_context, *pickle.loads(content))
-        except (AttributeError, ImportError):  # classes that have other names now
+        except (AttributeError, ImportError):  # classes that were renamed since
             return None
         self.names.append(name)
         return loaded
 
     def save_overload(self, sig: Any, data: Any) -> None:
-        """Keep a compiled function."""
+        """Store a compiled function."""
         if not data.library.has_dynamic_globals:
             self.names.append(self._name(sig))
             entries.save(self.names[-1], dumps(_slim(*data._reduce())))
@@ -139,7 +141,7 @@ class _KernelCache(_Cache):
 
 
 def _fields(kinds: Any) -> Iterator[tuple[str, ...]]:
-    """The names of the fields of all named tuples among types: code depends on their order, which types do not print."""
+    """The field names of all named tuples among types: code depends on their order, which printed types omit."""
     for kind in kinds:
         if isinstance(kind, types.BaseNamedTuple):
             yield kind.fields
@@ -148,7 +150,7 @@ def _fields(kinds: Any) -> Iterator[tuple[str, ...]]:
 
 
 def _slim(library: Any, *rest: Any) -> tuple[Any, ...]:
-    """A compiled function as numba reduces it, less bitcode and annotations in words, which are three quarters of its bytes."""
+    """A compiled function as numba pickles it, without bitcode and text annotations, which are three quarters of its bytes."""
     name, kind, (machine_code, _) = library
     made = list(rest)
     made[_ANNOTATION] = ""
@@ -156,7 +158,7 @@ def _slim(library: Any, *rest: Any) -> tuple[Any, ...]:
 
 
 def _stable(option: Any) -> str:
-    """An option in words that are the same in every process: sets of texts are in another order in each."""
+    """A text of an option that is the same in every process: sets of texts have a different order in each."""
     return repr(sorted(option) if isinstance(option, set | frozenset) else option)
 
 
@@ -170,7 +172,7 @@ class KernelDispatcher(Dispatcher):
         self._cache = _KernelCache(self)
 
     def get_call_template(self, args: Any, kws: Any) -> Any:
-        """The call by a function that is being compiled: it links the code of this one, which entries lack."""
+        """The call template for a function being compiled. Such a call links the code of this function, which entries lack."""
         types = tuple(self._compiler.fold_argument_types(args, kws)[1])
         self.compile(types)
         loaded = self.overloads.get(types)

@@ -1,7 +1,7 @@
 """The kernels that viewsphere calls, and the types of their arguments: the table `overloads.json`, by `scripts/kernels`.
 
-It lets kernels be compiled before anything calls them: all at once on several cores, or for a wheel. What the table lacks is
-compiled when it is called.
+It lets kernels be compiled before anything calls them: all at once on several cores, or for a wheel. Overloads that the table
+lacks are compiled when they are called.
 """
 
 from __future__ import annotations
@@ -21,8 +21,8 @@ TABLE = Path(__file__).with_name("overloads.json")
 
 @dataclass(frozen=True)
 class Overload:
-    """A kernel and the types of its arguments, in numba's words. `needs` are features of a shot that calls it; None if no frame
-    of any shot does, but models, exports or checks.
+    """A kernel and the types of its arguments, in numba's notation. `needs` are the features of a shot that calls it; None if
+    no frame calls it, only models, exports or checks.
     """
 
     module: str
@@ -37,7 +37,7 @@ class Overload:
         return f"{self.module}:{self.kernel}:{self.types}"
 
     def compile(self) -> bool:
-        """See to it that it is compiled; whether it was not."""
+        """Compile the overload if it is not in the cache; return True if it was compiled now."""
         kernel = getattr(import_module(self.module), self.kernel)
         before = sum(kernel.stats.cache_misses.values())
         kernel.compile(tuple(decoded(json.loads(self.types))))
@@ -64,7 +64,7 @@ def needed(features: frozenset[str]) -> tuple[Overload, ...]:
 
 
 def encoded(kind: Any) -> Any:
-    """A numba type as plain data; raises TypeError for kinds that kernels are not given."""
+    """A numba type as plain data; raises TypeError for types that kernels do not accept."""
     import numba
 
     types: Any = numba.types  # whose stubs lack most
@@ -81,7 +81,7 @@ def encoded(kind: Any) -> Any:
 
 
 def decoded(plain: Any) -> Any:
-    """numba types from plain data; a list of them from a list of such data."""
+    """A numba type from plain data, or a list of types from a list of such data."""
     from numba import types
 
     if isinstance(plain, str):

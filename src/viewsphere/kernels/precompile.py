@@ -1,4 +1,4 @@
-"""Kernels compiled on all cores, by processes of their own: numba compiles one at a time in each."""
+"""Kernel compilation on all cores, in several processes, since numba compiles one kernel at a time in each."""
 
 from __future__ import annotations
 
@@ -18,21 +18,21 @@ from typing import IO
 from viewsphere.kernels.overloads import Overload
 
 MOST_PROCESSES = 16
-"""A process takes a second and 250 MB to begin, and there are some 40 kernels to compile."""
+"""Limit of processes: each takes a second and 250 MB to start, and there are about 40 kernels to compile."""
 
 TOLD_S = 0.5
-"""Seconds between reports, so that a bar moves while a kernel takes long."""
+"""Seconds between reports, so that a progress bar keeps moving during a slow kernel."""
 
 COMPILED = "compiled"
 _PROGRAM = "from viewsphere.kernels.precompile import serve; serve()"
 _SOURCES = Path(__file__).parents[2]
 
 Told = Callable[[int, int], None]
-"""Given the number of kernels that are compiled, and of all, every half second."""
+"""A callback that receives the numbers of compiled kernels and of all kernels, every half second."""
 
 
 def compile_all(overloads: Sequence[Overload], tell: Told, processes: int | None = None) -> tuple[Overload, ...]:
-    """Compile overloads that no cache has; gives those that are compiled now. Others are when they are called."""
+    """Compile overloads that no cache has, and return those compiled now. The others are compiled when they are called."""
     waiting = SimpleQueue[Overload]()
     for each in overloads:
         waiting.put(each)
@@ -52,7 +52,7 @@ def compile_all(overloads: Sequence[Overload], tell: Told, processes: int | None
 
 
 def _drive(waiting: SimpleQueue[Overload], answered: Callable[[Overload, bool], None]) -> None:
-    """Have a process compile what waits, one after the other, until nothing does or it dies."""
+    """Let a process compile the waiting overloads one after another, until none waits or the process dies."""
     path = os.pathsep.join(filter(None, (str(_SOURCES), os.environ.get("PYTHONPATH"))))
     program = partial(subprocess.Popen, [sys.executable, "-c", _PROGRAM], env={**os.environ, "PYTHONPATH": path}, text=True)
     pipe = subprocess.PIPE
@@ -76,7 +76,7 @@ def _taken(waiting: SimpleQueue[Overload]) -> Iterable[Overload]:
 
 
 def serve(tasks: IO[str] = sys.stdin, answers: IO[str] = sys.stdout) -> None:
-    """Compile the overloads that come as lines, and answer each; one that cannot be compiled is left to its callers."""
+    """Compile the overloads that arrive as lines, and answer each. An overload that fails to compile is left to its callers."""
     for line in tasks:
         try:
             Overload(**json.loads(line)).compile()

@@ -1,4 +1,4 @@
-"""Kernels compiled by any numba's own passes.
+"""Kernel compilation with numba's own passes, for any version of numba.
 
 `compiler` is three times as fast; its code computes the same results, to the bit.
 """
@@ -12,12 +12,12 @@ from viewsphere.kernels.numba_target import jit
 
 
 def whole(function: Callable[..., Any], **options: Any) -> Any:
-    """The kernel that compiles a function, cached."""
+    """A function compiled as a kernel and cached."""
     return _compiled(function, {**options, "cache": True})
 
 
 def part(function: Callable[..., Any], **options: Any) -> Any:
-    """The part of kernels that compiles a function; Python cannot call it."""
+    """A function compiled as a part of kernels; Python cannot call it."""
     return _compiled(function, {**options, "no_cpython_wrapper": True, "no_cfunc_wrapper": True})
 
 

@@ -1,1 +1,1 @@
-"""From light to a picture: sky, ground and weather around the things, the view transform, effects."""
+"""The steps from light to a picture: sky, ground and weather around the objects, view transform, effects."""

@@ -1,4 +1,4 @@
-"""The background, seen where no object, scenery or ground is: a plain colour or a picture, display-linear."""
+"""The background behind all objects, scenery and ground: a plain colour or a picture, display-linear."""
 
 from __future__ import annotations
 
@@ -32,13 +32,13 @@ Rgb = tuple[int, int, int]
 FORMATS = ("PNG", "JPEG", "WEBP", "BMP", "GIF", "TIFF", "TGA", "PPM")
 
 KEPT_BYTES = 128 << 20
-"""Bytes of decoded pictures that are kept, the last ones used."""
+"""Limit in bytes of the cache of decoded pictures, which keeps the last ones used."""
 
 COARSE = 4.0
 """Sigma, in pixels, above which a picture is blurred at a lower resolution."""
 
 SMALLEST = 48
-"""Pixels a side below which a picture's resolution is not lowered further."""
+"""Smallest side, in pixels, to which a picture is reduced for blurring."""
 
 
 def shows_sky(background: Background) -> bool:
@@ -49,8 +49,8 @@ def shows_sky(background: Background) -> bool:
 def display_background(background: Background, width: int, height: int) -> Float32 | None:
     """The background as (height * width, 3) display-linear, exact in sRGB bytes; None for the sky, and for no background.
 
-    Where a picture is clear the background's colour is seen, else white. The array is kept for the next frame and must not be
-    written to. Raises RecipeError for a picture that cannot be read or has more pixels than `limits` allows.
+    Transparent parts of a picture show the background's colour, or white without one. The array is cached for the next frame
+    and must not be modified. Raises RecipeError for a picture that cannot be read or has more pixels than `limits` allows.
     """
     if background.transparent or shows_sky(background):
         return None
@@ -96,10 +96,10 @@ def _part(background: Background, size: Size, proportions: float) -> Box:
 
 
 def _reduced(part: Box, size: Size, step: int, orientation: int, found: Size) -> Box:
-    """A part of a picture of this size in the pixels of the picture that was `found`, which is `step` times smaller.
+    """A part of a picture of this size in the pixels of the decoded picture of size `found`, which is `step` times smaller.
 
-    Where the size is no multiple of `step`, the last pixels of the file's rows and columns stand for fewer than `step`; in a
-    turned picture these pixels may come first.
+    If the size is not a multiple of `step`, the last pixels of the file's rows and columns cover fewer than `step` original
+    pixels. In a rotated picture these pixels may come first.
     """
     before = [
         found[axis] - size[axis] / step if orientation in turned else 0.0
@@ -111,7 +111,7 @@ def _reduced(part: Box, size: Size, step: int, orientation: int, found: Size) ->
 
 @dataclass(frozen=True)
 class _Wanted:
-    """A picture to decode: reduced by the whole factor `step`, its clear parts laid over a colour."""
+    """A picture to decode: reduced by the whole factor `step`, its transparent parts laid over a colour."""
 
     path: str
     stamp: int
@@ -121,14 +121,14 @@ class _Wanted:
 
 @dataclass(eq=False)
 class _Shelf:
-    """Decoded pictures, as many as `KEPT_BYTES` allow, since a run draws the same ones again and again."""
+    """A cache of decoded pictures, as many as `KEPT_BYTES` allow, since a run reuses the same pictures many times."""
 
     _pictures: dict[_Wanted, Image] = field(default_factory=dict["_Wanted", "Image"])
 
     def picture(self, wanted: _Wanted) -> Image:
         """The picture, upright, RGB; raises RecipeError when it cannot be read."""
         found = self._pictures.pop(wanted, None) or _decoded(wanted)
-        self._pictures[wanted] = found  # the last used is the last to be dropped
+        self._pictures[wanted] = found  # the most recently used is dropped last
         held = sum(4 * p.width * p.height for p in self._pictures.values())
         while held > KEPT_BYTES and len(self._pictures) > 1:
             first = self._pictures.pop(next(iter(self._pictures)))
@@ -142,7 +142,7 @@ def _shelf() -> _Shelf:
 
 
 def _stamp(path: str) -> int:
-    """The file's time of change, so that a changed file is read again."""
+    """The file's modification time, so that a changed file is read again."""
     try:
         return Path(path).stat().st_mtime_ns
     except OSError as error:
@@ -211,7 +211,7 @@ def _decoded(wanted: _Wanted) -> Image:
 
 
 def _opaque(picture: Image, under: Rgb) -> Image:
-    """The picture as RGB, over a colour where it is clear; 16-bit greys keep their upper byte, floats are 0 to 1."""
+    """The picture as RGB, laid over a colour where it is transparent; 16-bit greys keep their upper byte, floats are 0 to 1."""
     from PIL import Image
 
     if picture.mode.startswith("I"):
@@ -229,7 +229,7 @@ def _opaque(picture: Image, under: Rgb) -> Image:
 
 
 def _blurred(pixels: Float32, sigma: float) -> Float32:
-    """A picture (H, W, 3) under a Gaussian of `sigma` pixels, mirrored at its borders: no light is lost."""
+    """A picture (H, W, 3) under a Gaussian of `sigma` pixels, mirrored at its borders so that no light is lost."""
     from PIL import Image
 
     height, width = pixels.shape[:2]

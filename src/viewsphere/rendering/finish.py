@@ -1,4 +1,4 @@
-"""From radiance to the finished picture."""
+"""The conversion of radiance to the finished picture."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from viewsphere.rendering.view import Bytes, Float32, develop, to_bytes, to_disp
 
 
 def finished(radiance: Float32, background: Float32 | None, finish: Finish, seen: Callable[[], Seen]) -> Bytes:
-    """The picture, (H, W, 3) uint8 sRGB, or (H, W, 4) with straight alpha where the background is transparent.
+    """The picture, (H, W, 3) uint8 sRGB, or (H, W, 4) with straight alpha if the background is transparent.
 
-    `radiance` (H, W, 4) float32 scene-linear, premultiplied; `background` (H * W, 3) or (1, 3) float32 display-linear, None
-    where the radiance covers every pixel. View, smoother, effects, sRGB curve, JPEG, in this order; `seen` is called only if an
+    `radiance` (H, W, 4) float32 scene-linear, premultiplied; `background` (H * W, 3) or (1, 3) float32 display-linear, None if
+    the radiance covers every pixel. View, smoother, effects, sRGB curve, JPEG, in this order; `seen` is called only if an
     effect or the smoother needs it.
     """
     alpha, effects = finish.background.transparent, finish.effects

@@ -11,14 +11,15 @@ Mask = NDArray[np.bool_]
 CYCLES = 6
 SWEEPS = 1
 COARSEST = 6
-"""Sides, in pixels, below which plain sweeps solve the equation."""
+"""Side length, in pixels, below which plain sweeps solve the equation."""
 
 
 def harmonic(values: Float32, free: Mask, fixed: Mask) -> Float32:
-    """Values (H, W, C) float32, those of free pixels (H, W) replaced by the mean of their neighbours.
+    """Values (H, W, C) float32 in which each free pixel (H, W) is the mean of its neighbours.
 
-    Neighbours are those of the four that are free or fixed; nothing passes through other pixels and the picture's border. Exact
-    to about a thousandth of the spread of the fixed values; where no fixed pixel is in reach, the mean of the fixed values.
+    Of the four adjacent pixels, only free or fixed ones are neighbours; other pixels and the picture's border are barriers. The
+    result is exact to about a thousandth of the spread of the fixed values. Free pixels that no fixed pixel reaches get the
+    mean of the fixed values.
     """
     levels = _levels(free, fixed)
     known = values[fixed]

@@ -1,7 +1,7 @@
 """Steps of a multigrid solver of count * v - sum of neighbours = right, on planes (C, H, W) of any region.
 
-Planes have a rim of one pixel that belongs to nothing; `inverse` (H, W) is 1 / (number of neighbours that count) at free
-pixels, else 0. Pixels that do not count hold 0.
+Planes have a rim of one pixel outside the region; `inverse` (H, W) is 1 / (number of neighbours that count) at free pixels,
+else 0. Pixels that do not count hold 0.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Weighted sums of shifted pictures: every blur that is the same everywhere."""
+"""Weighted sums of shifted pictures, for blurs that are uniform across the picture."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
-"""View transforms, composite and the sRGB curve, each for a block of pixels: only the transform that is used is compiled.
+"""View transforms, composite and the sRGB curve, each for a block of pixels, so that only the transform in use is compiled.
 
-A block p is flat, so that the compiler knows that its rows do not overlap: red, green, blue and alpha, BLOCK values each.
+A block p is flat, with BLOCK values each of red, green, blue and alpha, so that the compiler sees that its rows do not overlap.
 """
 
 from __future__ import annotations
@@ -16,17 +16,18 @@ FAST = {"contract", "arcp", "nsz", "afn", "reassoc"}
 BLOCK = 8192
 GREEN, BLUE, ALPHA = BLOCK, 2 * BLOCK, 3 * BLOCK
 
-KNEE = f4(0.6)  # from which on highlights are compressed; below, the picture is linear
-GREY_IN = f4(0.723223)  # Narkowicz' curve takes 0.18 times this to 0.18
+KNEE = f4(0.6)  # highlights above this are compressed; below, the picture is linear
+GREY_IN = f4(0.723223)  # Narkowicz' curve maps 0.18 times this to 0.18
 INSET, OUTSET = f4(0.8), f4(1.25)
-SHARE_R, SHARE_G, SHARE_B = f4(0.04235), f4(0.07845), f4(0.0792)  # weights of the grey that AgX adds
+SHARE_R, SHARE_G, SHARE_B = f4(0.04235), f4(0.07845), f4(0.0792)  # weights of the grey that AgX mixes in
 
 
 @njit(fastmath=FAST)
 def expose(radiance, matrix, p):
-    """Unpremultiplied, balanced, exposed light and alpha of radiance (4 n,), flat so that its pixels are known to be adjacent.
+    """Fill p with unpremultiplied, balanced, exposed light and alpha from radiance (4 n,), which is flat so that its pixels are
+    adjacent.
 
-    Where light exceeds what its coverage can show, as in a glint on clear glass, its alpha grows: it outshines what is behind.
+    If light is too bright for its coverage, as in a glint on clear glass, its alpha grows: the light outshines the background.
     """
     zero, one, a, b, c = f4(0), f4(1), U(0), U(1), U(2)
     xr, xg, xb = matrix[a, a], matrix[a, b], matrix[a, c]
@@ -73,7 +74,7 @@ def filmic(p):
 
 @njit(fastmath=FAST)
 def agx(p, sigmoid, decoded):
-    """See `view`. `sigmoid` has 256 values for each power of two from 2^-13: a float's bits index the two values around it."""
+    """See `view`. `sigmoid` has 256 values for each power of two from 2^-13; a float's bits index the two nearest values."""
     bits = p.view(np.int32)
     first = nb.int32((127 - 13) << 8)
     for i in range(U(BLOCK)):
@@ -138,7 +139,7 @@ def straight_bytes(p, curve, out):
 
 @njit(fastmath=FAST)
 def over(p, background, out):
-    """A block over the background (n or 1, 3), display-linear, (n, 3); or without it (n, 4), premultiplied."""
+    """A block over the background (n or 1, 3), display-linear, (n, 3); or without a background (n, 4), premultiplied."""
     step = U(0) if background.shape[0] == 1 else U(1)
     for i in range(U(out.shape[0])):
         alpha = p[U(ALPHA) + i]

@@ -1,12 +1,12 @@
-"""The border between the targets and the background, melted: Dwibedi et al., *Cut, Paste and Learn* (2017).
+"""Smoothing of the border between targets and background: Dwibedi et al., *Cut, Paste and Learn* (2017).
 
-Networks find the seam of a pasted object rather than the object; several kinds of seam on the same pictures stop that. All
-kinds work on the finished picture and on truth's mask, so they are the same over photographs, skies, grounds and shadows,
-and need no picture of the background alone: beyond the border either side is continued from its own pixels, without the
-border pixels themselves, which show both sides.
+Networks learn to find the seam of a pasted object rather than the object; several kinds of seam on the same pictures prevent
+that. All kinds work on the finished picture and on the ground-truth mask. So they act alike over photographs, skies, grounds
+and shadows, and need no picture of the background alone. Beyond the border, each side is continued from its own pixels, except
+the border pixels, which show both sides.
 
 - `box`, `gaussian`: the mask, blurred by a box of `size` pixels to each side or a Gaussian of that sigma, becomes the object's
-  opacity. Pixels out of the blur's reach do not change.
+  opacity. Pixels beyond the blur's reach do not change.
 - `poisson`: the object keeps its gradients and takes its border's colours from the background (Perez et al., *Poisson Image
   Editing*, 2003): a correction that is harmonic inside the mask is added to it. As in that paper, this is done on coded values
   (square roots of light, close to the sRGB curve). `size` has no effect here. At the picture's border the correction runs out
@@ -26,14 +26,16 @@ Float32 = NDArray[np.float32]
 Mask = NDArray[np.bool_]
 
 WIDER = {"box": 2.0, "gaussian": 0.6}
-"""Size that the blur continuing both sides has in addition to the mask's blur: it must reach beyond the border pixels."""
+"""Extra size of the blur that continues both sides, compared to the mask's blur, since it must reach beyond the border
+pixels.
+"""
 
 SIDE = 1.0
 """Sigma, in pixels, of the Gaussian that continues both sides for `poisson`."""
 
 
 def smooth_border(picture: Float32, targets: Mask, smoother: Smoother) -> Float32:
-    """The picture with its targets' border melted, a new array of the same shape; `none` and empty masks change nothing.
+    """The picture with its targets' border smoothed, a new array of the same shape; `none` and empty masks change nothing.
 
     `picture` (H, W, 3) display-linear, or (H, W, 4) premultiplied; `targets` (H, W) bool.
     """
@@ -67,7 +69,7 @@ def _window(mask: Mask, margin: int) -> tuple[slice, slice]:
 def _drawn_on(picture: Float32, mask: Mask, profile: Float32) -> Float32:
     """The picture continued from a mask's inner pixels: border pixels and those beyond become means of inner pixels nearby.
 
-    Where the mask has no inner pixels, as in a wire, its pixels count as they are; out of the blur's reach the picture stays.
+    If the mask has no inner pixels, as for a wire, all its pixels count. Beyond the blur's reach, the picture is unchanged.
     """
     core = mask & ~_touched(~mask)
     weight = np.where(core, np.float32(1), np.where(mask, np.float32(1e-4), np.float32(0)))[..., None]

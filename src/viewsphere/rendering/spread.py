@@ -1,4 +1,4 @@
-"""Blurs that are the same everywhere: a kernel's taps applied to pictures whose border pixels are repeated outwards."""
+"""Blurs that are uniform across the picture: a kernel's taps applied to pictures with border pixels repeated outwards."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""From scene-linear light to a picture: exposure, white balance, view transform, composite, sRGB curve.
+"""The conversion of scene-linear light to a picture: exposure, white balance, view transform, composite, sRGB curve.
 
 A *radiance* is scene-linear, premultiplied red, green, blue and alpha (the share of the pixel that is covered). It is
 unpremultiplied, balanced (`white`), multiplied by `EXPOSURE` and by two to the stops, transformed to *display-linear* values in
@@ -7,10 +7,10 @@ unpremultiplied, balanced (`white`), multiplied by `EXPOSURE` and by two to the 
 The transforms, x being the exposed light:
 
 - `standard`: x up to `KNEE`, above it k + (1 - k) y / (1 + y) with y = (x - k) / (1 - k), for each of red, green and blue:
-  colours up to the knee are shown as they are, nothing is ever clipped.
+  colours up to the knee are unchanged, and nothing is ever clipped.
 - `filmic`: the film-like curve of Narkowicz, *ACES Filmic Tone Mapping Curve* (2016; CC0 or MIT), x scaled so that middle grey,
-    0.18, stays where it is. The curve is applied to the largest and the smallest of the three channels; the middle one keeps
-  its relative place between them, as Adobe's DNG specification has it: so the hue stays.
+    0.18, is unchanged. The curve is applied to the largest and the smallest of the three channels; the middle one keeps
+  its relative place between them, as Adobe's DNG specification has it: so the hue is kept.
 - `agx`: Troy Sobotka's AgX (https://github.com/sobotka/AgX) in the shape of Wrensch, *Minimal AgX Implementation* (2023; MIT):
   colours are drawn towards grey by a fifth, 16.5 stops around middle grey go through a sigmoid of their logarithm, the
   colours are drawn out again and decoded with the exponent 2.2. Bright saturated light goes to white.
@@ -36,10 +36,10 @@ Float32 = NDArray[np.float32]
 Bytes = NDArray[np.uint8]
 
 EXPOSURE = 0.7
-"""Display value of unit radiance: level ground in the default sun and sky shows its own colour."""
+"""Display value of unit radiance, chosen so that level ground under the default sun and sky shows its own colour."""
 
 KNEE = 0.6
-"""Display values up to this are shown as they are by `standard`."""
+"""`standard` leaves display values up to this unchanged."""
 
 TRANSFORMS = ("standard", "filmic", "agx", "raw")
 """The names of the view transforms."""
@@ -94,7 +94,7 @@ def exposure_matrix(view: ViewTransform) -> Float32:
 
 
 def agx_sigmoid(light: ArrayLike) -> NDArray[np.float64]:
-    """Display code values in [0, 1] of light: a sigmoid of its stops through (0, 0), (pivot, 1/2) and (1, 1).
+    """Display code values in [0, 1] for linear light: a sigmoid of its stops through (0, 0), (pivot, 1/2) and (1, 1).
 
     Both halves are m d / (1 + c d^e)^(1/e), d the distance from the pivot, slope m = 2, exponents 3 below and 3.25 above.
     """
@@ -112,7 +112,9 @@ def agx_sigmoid(light: ArrayLike) -> NDArray[np.float64]:
 
 @cache
 def _agx_tables() -> tuple[Float32, Float32]:
-    """The sigmoid at 256 steps of each power of two from 2^-13 to 2^5; x^2.2 at steps of 1/1024 from 0 to 1, and one beyond."""
+    """The sigmoid at 256 steps of each power of two from 2^-13 to 2^5; and x^2.2 at steps of 1/1024 from 0 to 1, plus one entry
+    beyond.
+    """
     octaves = 2.0 ** np.arange(-13, 5)[:, None] * (1 + np.arange(256) / 256)
     sigmoid = agx_sigmoid(np.append(octaves.reshape(-1), 32.0))
     decoded = np.minimum(np.arange(1026) / 1024, 1) ** 2.2

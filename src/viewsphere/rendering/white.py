@@ -13,7 +13,7 @@ NEUTRAL_K = 6500.0
 """The temperature that changes nothing: D65, the white of sRGB."""
 
 TINT = 0.02
-"""Distance, in CIE 1960 (u, v), by which a tint of 1 leaves the line of temperatures."""
+"""Distance, in CIE 1960 (u, v), of a tint of 1 from the line of temperatures."""
 
 XYZ_FROM_SRGB = np.array([[0.4124, 0.3576, 0.1805], [0.2126, 0.7152, 0.0722], [0.0193, 0.1192, 0.9505]])
 """Linear sRGB to CIE XYZ, IEC 61966-2-1."""
@@ -24,9 +24,11 @@ BRADFORD = np.array([[0.8951, 0.2664, -0.1614], [-0.7502, 1.7135, 0.0367], [0.03
 
 @lru_cache(maxsize=256)
 def white_balance(temperature_k: float, tint: float) -> Float:
-    """Linear sRGB to linear sRGB, (3, 3) float64: the named light becomes neutral and keeps its luminance.
+    """A matrix from linear sRGB to linear sRGB, (3, 3) float64: light of this temperature and tint becomes neutral and keeps
+    its luminance.
 
-    Exactly the identity for 6500 K without tint. A tint above 0 neutralises greener light: the picture turns towards magenta.
+    Exactly the identity for 6500 K without tint. A tint above 0 neutralises greener light, which turns the picture towards
+    magenta.
     """
     if temperature_k == NEUTRAL_K and tint == 0:
         return np.eye(3)
@@ -39,9 +41,9 @@ def white_balance(temperature_k: float, tint: float) -> Float:
 def white_xyz(temperature_k: float, tint: float) -> Float:
     """CIE XYZ with Y = 1 of the light of this temperature and tint, (3,).
 
-    Temperatures lie on the black bodies' line of Krystek, *An algorithm to calculate correlated colour temperature* (1985);
-    from 3000 to 5000 K the line crosses over to daylight's, a little greener: 6500 K is D65. Tints lie across it, greener above
-    0.
+    Temperatures follow the black-body locus of Krystek, *An algorithm to calculate correlated colour temperature* (1985). From
+    3000 to 5000 K it blends into the slightly greener daylight locus, so that 6500 K is D65. Tint moves across the locus,
+    towards green above 0.
     """
     x, y, z = XYZ_FROM_SRGB @ np.ones(3)
     d65 = np.array([4 * x, 6 * y]) / (x + 15 * y + 3 * z)

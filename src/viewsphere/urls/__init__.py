@@ -1,7 +1,8 @@
-"""Files and folders at URLs of any kind that fsspec knows (`s3://`, `gs://`, `az://`, `memory://`, ...), read as on a disk.
+"""Files and folders at URLs of any kind that fsspec supports (`s3://`, `gs://`, `az://`, `memory://`, ...), read like those on
+a disk.
 
-A root is a path, and all else is named below it. A root on a disk is a `pathlib.Path`; one at a URL is a `RemotePath`, which
-has those methods of a Path that read and list, and no others, so that nothing is done to the disk by mistake:
+A root is a path, and all other names are relative to it. A root on a disk is a `pathlib.Path`; a root at a URL is a
+`RemotePath`. The latter has only the methods of a Path that read and list, so that no call changes the disk by mistake:
 
     read    path.read_bytes(), path.read_text(), path.open() in blocks; `byte_range` of a file
     list    path.iterdir(), path.glob(), path.is_file(), path.is_dir(), path.stat(); `files_below` a folder
@@ -31,8 +32,8 @@ _URL = re.compile(r"[A-Za-z][A-Za-z0-9+.:-]+:/")
 
 
 def located(root: str | os.PathLike[str]) -> Path:
-    """The path of a data set's root: that of a folder, or a `RemotePath` for a URL. Raises UserError for a URL with a password,
-    which would be shown and kept.
+    """The path of a data set's root: a folder's path, or a `RemotePath` for a URL. Raises UserError for a URL with a password,
+    which would be displayed and stored.
     """
     if isinstance(root, RemotePath):
         return root
@@ -47,7 +48,7 @@ def located(root: str | os.PathLike[str]) -> Path:
 
 
 def files_below(folder: Path) -> Iterator[str]:
-    """Paths, from a folder, of all files in it and below, in an order that does not depend on the disk."""
+    """Paths, relative to a folder, of all files in it and below, in an order that does not depend on the disk."""
     if isinstance(folder, RemotePath):
         yield from folder.files_below()
         return
@@ -58,7 +59,7 @@ def files_below(folder: Path) -> Iterator[str]:
 
 
 def byte_range(file: Path, start: int, size: int) -> bytes:
-    """So many bytes of a file from `start` on, fewer where it ends before; raises OSError as reading does."""
+    """`size` bytes of a file from `start` on, fewer if the file ends before; raises OSError if reading fails."""
     if isinstance(file, RemotePath):
         return file.byte_range(start, size)
     with open_file(file) as stream:
@@ -69,7 +70,7 @@ def byte_range(file: Path, start: int, size: int) -> bytes:
 
 @contextmanager
 def here(path: Path) -> Generator[Path]:
-    """A file or a folder on this machine, for as long as the block lasts: itself, or a copy of the same name of what lies at a
+    """A file or folder on this machine for the duration of the block: the path itself, or a copy of the same name if it is at a
     URL.
     """
     if not isinstance(path, RemotePath):
@@ -86,7 +87,7 @@ def here(path: Path) -> Generator[Path]:
 
 
 def download(file: Path, destination: Path, most: int = sys.maxsize) -> bool:
-    """Copy a file from a URL to a disk, block by block, at most so many bytes of it; returns whether that is all of it."""
+    """Copy a file from a URL to a disk, block by block, up to `most` bytes; return True if that is the whole file."""
     destination.parent.mkdir(parents=True, exist_ok=True)
     with open_file(file) as read, destination.open("wb") as write:
         while block := read.read(min(BLOCK, most + 1)):
@@ -98,8 +99,8 @@ def download(file: Path, destination: Path, most: int = sys.maxsize) -> bool:
 
 
 def link_file(source: Path, destination: Path) -> str:
-    """Put a file at `destination` on a disk, which must not exist: as a `hard link`, else a `reflink`, else a `copy`; returns
-    which. What lies at a URL is a `download`.
+    """Put a file at `destination` on a disk, which must not exist: as a `hard link`, else a `reflink`, else a `copy`; return
+    which. A file at a URL is a `download`.
     """
     if isinstance(source, RemotePath):
         download(source, destination)

@@ -1,4 +1,4 @@
-"""Paths that a stranger may have written: whether they stay where they belong."""
+"""Containment checks for paths from untrusted sources."""
 
 from __future__ import annotations
 
@@ -6,11 +6,11 @@ import re
 from pathlib import PurePosixPath, PureWindowsPath
 
 PLAIN = re.compile(r"[\w+-][\w+.-]*(?:/[\w+-][\w+.-]*)*", re.ASCII)
-"""Relative paths that mean the same on every system; other ones are looked at more closely."""
+"""Relative paths that mean the same on every system; others are examined more closely."""
 
 
 def is_inside(relative: str) -> bool:
-    """Return whether a path is relative on every system, and goes up nowhere."""
+    """Return whether a path is relative on every system and never leads to a parent folder."""
     if PLAIN.fullmatch(relative):
         return True
     path, on_windows = PurePosixPath(relative), PureWindowsPath(relative)

@@ -1,4 +1,4 @@
-"""A file or folder at a URL, read through fsspec. What does not answer is asked again, a few times, and then told in a line."""
+"""A file or folder at a URL, read through fsspec. Failed requests are retried a few times and then reported in one line."""
 
 from __future__ import annotations
 
@@ -24,29 +24,29 @@ else:
 Answer = TypeVar("Answer")
 
 BLOCK = 8 << 20
-"""Bytes of a larger file that are asked for at once."""
+"""Bytes of a larger file that are requested at once."""
 
 FIRST_WAIT_S = 0.2
-"""Seconds before the second try; before each further one it is three times as long."""
+"""Seconds before the second try; the delay triples before each further one."""
 
 MISTAKES = (TypeError, AttributeError, NameError, NotImplementedError, MemoryError)
-"""Exceptions that no further try mends, and no user."""
+"""Exceptions that neither a retry nor the user can fix."""
 
 OPTIONS: dict[str, dict[str, Any]] = {"s3": {"max_concurrency": 1, "config_kwargs": {"retries": {"max_attempts": 0}}}}
 """Options of file systems by kind of URL. s3fs requests no sizes before it reads, and does not retry: MAX_REMOTE_TRIES does."""
 
 ANSWERS = (FileNotFoundError, FileExistsError, IsADirectoryError, NotADirectoryError)
-"""Exceptions that say what is there."""
+"""Exceptions that are answers about the path, not failures."""
 
 _SECRET = re.compile(r"://[^/\s@]*:[^/\s@]*@")
 """User and password in a URL."""
 
 
 class RemotePath(Base):
-    """A path below a URL: it reads and lists as a `pathlib.Path` does, which type checkers take it for. Files are never
-    written by it but whole.
+    """A path below a URL that reads and lists like a `pathlib.Path`; type checkers treat it as one. It writes only complete
+    files.
 
-    Raises FileNotFoundError as a Path does, and RemoteError where the URL does not answer, or refuses.
+    Raises FileNotFoundError like a Path, and RemoteError if the URL does not answer or refuses.
     """
 
     @classmethod
@@ -71,25 +71,25 @@ class RemotePath(Base):
         return self._asked("read", lambda system, path: bytes(system.cat_file(path)))
 
     def read_text(self, encoding: str | None = None, errors: str | None = None) -> str:
-        """The file's text, its line ends as they are."""
+        """The file's text with its line ends unchanged."""
         return self.read_bytes().decode(encoding or "utf-8", errors or "strict")
 
     def byte_range(self, start: int, size: int) -> bytes:
-        """So many bytes of the file from `start` on, fewer where it ends before."""
+        """`size` bytes of the file from `start` on, fewer if it ends before."""
 
         def read(system: Any, path: str) -> bytes:
             try:
                 found = bytes(system.cat_file(path, start=start, end=start + size))
             except OSError as error:
-                if error.errno == errno.EINVAL:  # what s3fs makes of status 416: it ends before `start`
+                if error.errno == errno.EINVAL:  # s3fs's error for status 416: the file ends before `start`
                     return b""
                 raise
-            return found if len(found) <= size else found[start : start + size]  # of servers that know no ranges
+            return found if len(found) <= size else found[start : start + size]  # of servers that do not support ranges
 
         return self._asked("read", read) if size else b""
 
     def open(self, mode: str = "r", buffering: int = -1, encoding: str | None = None, **_: Any) -> IO[Any]:  # pyright: ignore[reportIncompatibleMethodOverride]
-        """The file, to be read in blocks; text has its line ends as they are."""
+        """The file as a stream that is read in blocks; text keeps its line ends."""
         if set(mode) - set("rbt"):
             raise io.UnsupportedOperation(mode)
         size = self.stat().st_size
@@ -97,7 +97,7 @@ class RemotePath(Base):
         return stream if "b" in mode else io.TextIOWrapper(stream, encoding or "utf-8", newline="\n")
 
     def write_bytes(self, data: bytes) -> int:  # pyright: ignore[reportIncompatibleMethodOverride]
-        """Put a file of these bytes here, whole or not at all; gives their number."""
+        """Write a file of these bytes here, completely or not at all; return their number."""
 
         def write(system: Any, path: str) -> None:
             _make_parent(system, path)
@@ -107,7 +107,7 @@ class RemotePath(Base):
         return len(data)
 
     def upload(self, file: Path) -> None:
-        """Put a copy of a disk's file here, whole or not at all."""
+        """Write a copy of a local file here, completely or not at all."""
 
         def write(system: Any, path: str) -> None:
             _make_parent(system, path)
@@ -116,7 +116,7 @@ class RemotePath(Base):
         self._written(write)
 
     def unlink(self, missing_ok: bool = True) -> None:
-        """Remove the file; nothing happens where there is none."""
+        """Remove the file; do nothing if it does not exist."""
         try:
             self._asked("remove", lambda system, path: system.rm_file(path))
         except FileNotFoundError:
@@ -132,11 +132,11 @@ class RemotePath(Base):
         return (self._info() or {}).get("type") == "file"
 
     def is_dir(self, **_: bool) -> bool:
-        """Return whether anything lies below."""
+        """Return whether anything is below this path."""
         return (self._info() or {}).get("type") == "directory"
 
     def is_symlink(self) -> bool:
-        """There are no links."""
+        """Return False: there are no links."""
         return False
 
     def resolve(self, strict: bool = False) -> RemotePath:
@@ -152,10 +152,10 @@ class RemotePath(Base):
         return self == other_path
 
     def mkdir(self, mode: int = 0o777, parents: bool = False, exist_ok: bool = False) -> None:
-        """Nothing: folders are there as soon as something is in them."""
+        """Do nothing: a folder exists as soon as it contains a file."""
 
     def stat(self, **_: bool) -> os.stat_result:
-        """Size in bytes, and when it was written in seconds since 1970, where that is known (else 0); all else is 0."""
+        """Size in bytes, and modification time in seconds since 1970 if known (else 0); all other fields are 0."""
         info = self._info()
         if info is None:
             raise self._lacking()
@@ -181,16 +181,16 @@ class RemotePath(Base):
             return
 
     def rglob(self, pattern: str, **_: Any) -> Generator[RemotePath]:
-        """The files below, no folders, that have such a name."""
+        """The files below, without folders, whose names match."""
         yield from (self / path for path in self.files_below() if fnmatchcase(path.rpartition("/")[2], pattern))
 
     def files_below(self) -> list[str]:
-        """Paths of all files below, from here, sorted; none where there is no folder."""
+        """Relative paths of all files below, sorted; empty if there is no folder."""
         return list(self.sizes_below())
 
     def sizes_below(self) -> dict[str, int]:
-        """The bytes of all files below, by their paths from here, sorted; none where there is no folder. Raises RemoteError
-        where one of them has a name that would lead out of a folder on a disk.
+        """The sizes in bytes of all files below, by relative path, sorted; empty if there is no folder. Raises RemoteError if a
+        name would lead out of a folder on a disk.
         """
 
         def find(system: Any, path: str) -> dict[str, int]:
@@ -208,7 +208,7 @@ class RemotePath(Base):
 
     @property
     def is_shared(self) -> bool:
-        """Return whether other processes find the same files there."""
+        """Return whether other processes see the same files there."""
         return self.parts[0] != "memory:"
 
     def _info(self) -> dict[str, Any] | None:
@@ -228,7 +228,7 @@ class RemotePath(Base):
         return FileNotFoundError(errno.ENOENT, os.strerror(errno.ENOENT), str(self))
 
     def _asked(self, what: str, ask: Callable[[Any, str], Answer]) -> Answer:
-        """The file system's answer, which is asked up to MAX_REMOTE_TRIES times."""
+        """The file system's answer, requested up to MAX_REMOTE_TRIES times."""
         system, path = _system(str(self))
         for tries in range(1, limits.MAX_REMOTE_TRIES + 1):
             try:
@@ -253,7 +253,7 @@ class RemotePath(Base):
 
 
 class _Blocks(io.RawIOBase):
-    """A file of known size as a stream that asks for its blocks one by one."""
+    """A file of known size as a stream that requests its blocks one by one."""
 
     def __init__(self, path: RemotePath, size: int) -> None:
         self._path, self._size, self._at = path, size, 0
@@ -267,16 +267,16 @@ class _Blocks(io.RawIOBase):
         return True
 
     def seek(self, offset: int, whence: int = io.SEEK_SET) -> int:
-        """Go to a place in the file."""
+        """Move to a position in the file."""
         self._at = offset + {io.SEEK_SET: 0, io.SEEK_CUR: self._at, io.SEEK_END: self._size}[whence]
         return self._at
 
     def tell(self) -> int:
-        """The place in the file."""
+        """The position in the file."""
         return self._at
 
     def readinto(self, buffer: Any) -> int:
-        """Read the next bytes; raises RemoteError where the file became shorter."""
+        """Read the next bytes; raises RemoteError if the file became shorter."""
         wanted = max(0, min(len(buffer), self._size - self._at))
         data = self._path.byte_range(self._at, wanted)
         if len(data) != wanted:
@@ -296,19 +296,19 @@ def shown(error: object) -> str:
 
 
 def _is_refusal(error: Exception) -> bool:
-    """Return whether it is about who asks, so that asking again does not help."""
+    """Return whether an error is about the user's credentials or permissions, so that a retry does not help."""
     return isinstance(error, PermissionError) or "Credential" in type(error).__name__
 
 
 def _make_parent(system: Any, path: str) -> None:
-    """Make the folder of a file, where folders are made: object stores have none, and would make buckets."""
+    """Create the folder of a file if the file system has folders. Object stores have none, and would create buckets."""
     if not system.async_impl:
         system.makedirs(path.rpartition("/")[0], exist_ok=True)
 
 
 def _system(url: str) -> tuple[Any, str]:
-    """The file system of a URL and the path there; fsspec keeps one file system of each kind a process. Listings are not kept:
-    other processes write, too. Raises MissingExtraError where a package is missing.
+    """The file system of a URL and the path in it. fsspec keeps one file system of each kind per process. Listings are not
+    cached, since other processes write, too. Raises MissingExtraError if a package is missing.
     """
     protocol = url.partition("://")[0]
     try:

@@ -1,4 +1,4 @@
-"""The animations of a file, and the times at which they play; nothing here reads a file."""
+"""The animations of a file and the times at which they play. This module reads no files."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ class Clip:
 
 @dataclass(frozen=True)
 class Timeline:
-    """First and last frame of a file, its frames a second, whether anything in it moves, and its animations."""
+    """First and last frame of a file, its frames per second, whether anything in it moves, and its animations."""
 
     first: int
     last: int
@@ -30,5 +30,7 @@ class Timeline:
 
 
 def no_animation(file: object) -> str:
-    """Return the error for a file without motion that is to play an animation; the text follows the recipe's field."""
+    """Return the error for a recipe that requests an animation of a file without motion; the text follows the recipe's
+    field.
+    """
     return f"expected a file in which something moves; found no animation in {file}"

@@ -1,4 +1,4 @@
-"""A model whose vertices change over time: a mesh at each time step, of arrays that are shared where they are equal."""
+"""A model whose vertices change over time: a mesh at each time step; equal arrays are shared."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from viewsphere.model.thing import TimeStep
 
 
 class Load(Protocol):
-    """Gives a normalised model at a time step (None: as it rests); raises ModelError if its file cannot be used."""
+    """Loads a normalised model at a time step (None: at rest); raises ModelError if its file cannot be used."""
 
     def __call__(self, spec: ModelSpec, step: TimeStep | None = None, /) -> Mesh:
         """The mesh in object axes, metres."""
@@ -24,9 +24,9 @@ class Load(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class DeformingMesh:
-    """`meshes` by the frame of their model's file, ascending; what is equal at one frame and the next is one object.
+    """`meshes` by the frame of their model's file, ascending; data that is equal at successive frames is one object.
 
-    A model whose triangles change has them at each frame; most change vertices and normals alone.
+    If a model's triangles change, each frame has its own. In most models, only vertices and normals change.
     """
 
     meshes: Mapping[int, Mesh]
@@ -39,7 +39,7 @@ class DeformingMesh:
 
 
 def sharing(mesh: Mesh, other: Mesh) -> Mesh:
-    """The mesh with the arrays, materials and images of another where they are equal."""
+    """The mesh with those arrays, materials and images replaced by another mesh's that are equal to them."""
     same = {f.name: getattr(other, f.name) for f in fields(Mesh) if _equal(getattr(mesh, f.name), getattr(other, f.name))}
     return replace(mesh, **same)
 

@@ -1,4 +1,4 @@
-"""Parts of bodies: which bone of its skin moves each triangle."""
+"""Body parts: the bone of the skin that moves each triangle."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ NONE = -1
 
 
 def strongest(bones: Int, weights: NDArray[np.float64], triangles: Int) -> Int:
-    """The bone of each triangle (T,): that with the largest sum of weights at its corners, which is the largest at its middle;
-    of equal ones the first, and `NONE` where all weights are 0.
+    """The bone of each triangle (T,): the one with the largest sum of weights at its corners, and so with the largest weight at
+    its middle. Among equal bones the first counts; if all weights are 0, the result is `NONE`.
 
-    `bones` and `weights` (V, K) are those of each vertex; `triangles` (T, 3) index vertices.
+    `bones` and `weights` (V, K) belong to the vertices; `triangles` (T, 3) index vertices.
     """
     found = np.full(len(triangles), NONE, np.int64)
     if not bones.size or not triangles.size:
@@ -38,8 +38,9 @@ def strongest(bones: Int, weights: NDArray[np.float64], triangles: Int) -> Int:
 
 
 def joined(pieces: Sequence[tuple[tuple[str, ...], Int | None, int]]) -> tuple[tuple[str, ...], NDArray[np.int32] | None]:
-    """The names of all bones of some pieces, each once, and the number of each triangle's, from 1, 0 for none; None where no
-    piece has bones. Of each piece: names of its bones, the bone of each triangle (None: no bones), how many triangles it has.
+    """The names of all bones of some pieces, each once, and the bone number of each triangle, from 1, 0 for none; None if no
+    piece has bones. Each piece gives the names of its bones, the bone of each triangle (None: no bones), and its number of
+    triangles.
     """
     names = tuple(dict.fromkeys(name for own, _, _ in pieces for name in own))
     if not names:
@@ -53,7 +54,9 @@ def joined(pieces: Sequence[tuple[tuple[str, ...], Int | None, int]]) -> tuple[t
 
 
 def grouped(mesh: Mesh, parts: Mapping[str, Sequence[str]]) -> Mesh:
-    """The mesh whose bones are these named parts of its body; bones that none of them names are none. All are the mesh's."""
+    """The mesh with its bones grouped into these named body parts; bones in none of them become 0. All named bones must be the
+    mesh's.
+    """
     numbers = {bone: i for i, bones in enumerate(parts.values(), 1) for bone in bones}
     table = np.array([0, *(numbers.get(name, 0) for name in mesh.body_parts)], np.int32)
     assert mesh.triangle_body_part is not None

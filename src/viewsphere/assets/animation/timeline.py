@@ -1,6 +1,4 @@
-"""A file's timeline, from its reader, or else from Blender. Answers are cached until the file, or a file that it names,
-changes.
-"""
+"""A file's timeline, from its reader or else from Blender, cached until the file, or a file that it names, changes."""
 
 from __future__ import annotations
 
@@ -24,14 +22,14 @@ from viewsphere.errors import ModelError
 
 @dataclass(eq=False)
 class Blenders:
-    """Answers requests about files by running Blenders, one for all files of a folder. A context manager, which ends them."""
+    """Blender processes that answer requests about files, one for all files of a folder. A context manager, which ends them."""
 
     _stack: ExitStack
     _running: dict[tuple[Path, bool], BlenderProcess]
 
     @staticmethod
     def none_yet() -> Blenders:
-        """No Blender runs yet: each is started when it is first needed."""
+        """The object without running processes: each Blender starts when it is first needed."""
         return Blenders(ExitStack(), {})
 
     def __enter__(self) -> Blenders:
@@ -41,7 +39,9 @@ class Blenders:
         self._stack.close()
 
     def told(self, path: Path, confined: bool, do: str, about: Mapping[str, Any]) -> dict[str, Any]:
-        """The answer to a request about a file, cached or from Blender; ModelError in one line when Blender has no answer."""
+        """The answer to a request about a file, cached or from Blender; raises a one-line ModelError if Blender has no
+        answer.
+        """
         file = split_source(path)[0]
         animated_reader(file)
 
@@ -54,8 +54,8 @@ class Blenders:
         return kept(file, f"{do} {confined} {sorted(about.items())}", ask)
 
     def timeline(self, path: Path, confined: bool, clip: str | None = None, fps: float | None = None) -> Timeline:
-        """The file's timeline while the animation `clip` plays, by default the first one, in frames of which `fps` make a
-        second, by default as many as the file says.
+        """The file's timeline while the animation `clip` plays, by default the first one, at `fps` frames per second, by
+        default the file's own rate.
         """
         file = split_source(path)[0]
         if animated_reader(file).timeline is not None:
@@ -88,10 +88,10 @@ def _timeline_apart(file: Path, confined: bool, clip: str | None = None, fps: fl
 
 
 def animation_of(path: Path, confined: bool) -> Timeline | None:
-    """The timeline of a file in which something moves, None for any other. Blender reads those of which no reader
-    has the timeline.
+    """The timeline of a file in which something moves, None for any other. If no reader supplies the timeline, Blender reads
+    it.
 
-    Raises ModelError where Blender has no answer, or there is none.
+    Raises ModelError if Blender has no answer or is not installed.
     """
     file = split_source(path)[0]
     suffix = suffix_of(file)

@@ -1,4 +1,4 @@
-"""Finds the alpha mode of base-colour textures whose file format cannot state it."""
+"""Detection of the alpha mode of base-colour textures whose file format cannot state it."""
 
 from __future__ import annotations
 
@@ -14,30 +14,31 @@ from viewsphere.assets.paths.folder import ModelFolder
 from viewsphere.assets.primitive import Primitive
 
 SOLID = 250
-"""Texels with at least this alpha are taken as opaque."""
+"""Texels with at least this alpha count as opaque."""
 
 SLIGHT_SHARE = 0.001
-"""A material of whose visible texels at most this share is not solid is opaque: specks are no shape."""
+"""Greatest share of non-solid visible texels in an opaque material: specks do not make a shape."""
 
 BINARY_SHARE = 0.02
-"""A material of whose visible texels at most this share is neither clear nor solid is a cut-out (MASK)."""
+"""Greatest share of visible texels that are neither clear nor solid in a cut-out material (MASK)."""
 
 
 CUT_OUT_SHARE = 0.25
-"""Share of texels between clear and solid above which unstated alpha is no opacity, but gloss or height. Soft edges of discs
-reach a fifth in tests; no real textures were measured.
+"""Share of texels between clear and solid above which undeclared alpha is treated as gloss or height, not opacity. Soft edges
+of discs reach a fifth in tests; no real textures were measured.
 """
 
 
 def with_alpha_modes(
     folder: ModelFolder, pieces: Sequence[Primitive], materials: Sequence[Material], stated: Container[int] = ()
 ) -> list[Material]:
-    """The materials; opaque ones get the alpha mode that suits the texels visible on their triangles.
+    """The materials; opaque ones get the alpha mode that fits the texels visible on their triangles.
 
-    Texels between the islands of an atlas are not visible and do not count. Texels on the rim of an island do not count
-    either, unless all lie there: the edges of island and picture seldom agree to the texel. A texture that is clear all over
-    counts as opaque: an exporter's mistake. Where the file does not state that alpha is opacity (`stated` are the indices of
-    the materials of which it does), only the alpha of a cut-out, mostly clear or solid, is: a warning says which was chosen.
+    Texels between the islands of an atlas are not visible and do not count. Texels on the rim of an island do not count either,
+    unless all texels are there, since the edges of island and picture rarely match to the texel. A completely clear texture
+    counts as opaque, as it is an exporter's mistake. `stated` are the indices of materials for which the file states that alpha
+    is opacity. For the others, only alpha that is mostly clear or solid (a cut-out) counts as opacity, and a warning reports
+    the choice.
     """
     return [
         material if material.alpha_mode != "OPAQUE" else _with_mode(folder, index, material, pieces, stated=index in stated)
@@ -64,7 +65,7 @@ def _with_mode(folder: ModelFolder, index: int, material: Material, pieces: Sequ
 def _shown_alpha(
     index: int, material: Material, pieces: Sequence[Primitive], images: Sequence[Image]
 ) -> NDArray[np.uint8] | None:
-    """Alpha of the texels that triangles of a material show, None where all are solid, or clear."""
+    """Alpha of the texels that triangles of a material show; None if all are solid or all are clear."""
     texture = material.base_color_texture
     if texture is None:
         return None

@@ -1,4 +1,4 @@
-"""Texture coordinates in metres, from the sides of a box: for surfaces of any shape, whatever coordinates their file has."""
+"""Texture coordinates in metres by box projection, for surfaces of any shape, independent of the coordinates in their file."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ _GOLDEN = 0.6180339887498949
 
 
 def box_mapped(mesh: Mesh, chosen: NDArray[np.bool_], grained: NDArray[np.bool_], rest: Mesh | None = None) -> Mesh:
-    """The mesh whose chosen triangles (T,) have coordinates uv0 in metres, v down, on the side of a box that it faces most.
+    """The mesh in which each chosen triangle (T,) has coordinates uv0 in metres, v down, on the box side that it faces most.
 
-    grained (T,): u runs along the longer side of the triangle's part, and each part lies elsewhere, as pieces cut from one
-    material do. rest: the same triangles as they are at rest, whose places and normals count where the model deforms.
+    grained (T,): u runs along the longer side of the triangle's part, and each part has a different offset, like pieces cut
+    from one material. rest: the same triangles at rest, whose positions and normals are used for a deforming model.
 
-    Triangles stay as many and in their order; a vertex that has several coordinates becomes several, all in one place. Colours
-    of vertices are white there.
+    The number and order of triangles stay the same. A vertex with several coordinates is split into several at one position.
+    Vertex colours become white there.
     """
     still = mesh if rest is None or rest.triangles.shape != mesh.triangles.shape else rest
     vertices = still.vertices.astype(np.float64)
@@ -56,14 +56,14 @@ def box_mapped(mesh: Mesh, chosen: NDArray[np.bool_], grained: NDArray[np.bool_]
 
 
 def _first(index: NDArray[np.intp], count: int) -> NDArray[np.intp]:
-    """For each of so many numbers a place in `index` that has it."""
+    """For each number below `count`, a position in `index` that holds it."""
     places = np.empty(count, np.intp)
     places[index.reshape(-1)] = np.arange(index.size)
     return places
 
 
 def _is_turned(mesh: Mesh, vertices: Float, side: NDArray[np.int64]) -> NDArray[np.bool_]:
-    """For each triangle (T,) whether its part reaches farther up than right on the triangle's side."""
+    """A mask (T,) of the triangles whose part extends farther up than right on the triangle's side."""
     low, high = (np.full((len(mesh.parts), 3), fill) for fill in (np.inf, -np.inf))
     corners, parts = vertices[mesh.triangles], mesh.triangle_part
     np.minimum.at(low, parts, corners.min(axis=1))
@@ -73,7 +73,9 @@ def _is_turned(mesh: Mesh, vertices: Float, side: NDArray[np.int64]) -> NDArray[
 
 
 def _coordinates(places: Float, way: NDArray[np.int64]) -> NDArray[np.float32]:
-    """(N, 2) of places (N, 3), each mapped in its way: 6 sides, lying or turned, shifted by the number of its part."""
+    """Coordinates (N, 2) of positions (N, 3), each mapped by its `way`: one of 6 sides, upright or turned, shifted by its
+    part's number.
+    """
     side, turned, part = way % 6, way // 6 % 2 == 1, way // 12
     right, up = (places * _RIGHT[side]).sum(axis=1), (places * _UP[side]).sum(axis=1)
     u, v = np.where(turned, up, right), np.where(turned, right, -up)

@@ -1,4 +1,4 @@
-"""The eleven basic colour terms of English (B. Berlin and P. Kay, Basic Color Terms, 1969), and which of them a colour is."""
+"""The eleven basic colour terms of English (B. Berlin and P. Kay, Basic Color Terms, 1969), and the term for a colour."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ PROTOTYPES = {
     "pink": ("#f080b8", "#ffc0d0", "#e83890"),
     "brown": ("#784818", "#482810", "#b08860"),
 }
-"""sRGB colours that are called so: a colour has the name of the nearest of them in OKLab."""
+"""Example sRGB colours of each term: a colour gets the name of the nearest one in OKLab."""
 
 NAMES = tuple(PROTOTYPES)
 
@@ -39,7 +39,7 @@ _LAB = np.array(
     ]
 )
 LEAST = 1e-6
-"""Light of a cone from which on it counts."""
+"""Least cone response used for OKLab."""
 
 
 def oklab(light: ArrayLike) -> NDArray[np.float64]:
@@ -54,7 +54,7 @@ def _product(matrix: NDArray[np.float64], values: NDArray[np.float64]) -> NDArra
 
 
 def nearest_names(light: ArrayLike) -> NDArray[np.int64]:
-    """For linear sRGB colours (N, 3) the numbers in `NAMES` of what they are called."""
+    """Indices in `NAMES` of the terms for linear sRGB colours (N, 3)."""
     squares = (oklab(np.clip(light, 0.0, 1.0))[:, None] - _PLACES) ** 2
     return _OWNERS[(squares[..., 0] + squares[..., 1] + squares[..., 2]).argmin(axis=1)]
 

@@ -1,4 +1,4 @@
-"""The appearance of a mesh: its surface in patches of one basic colour and one material, and the words for the whole."""
+"""The appearance of a mesh: its surface as patches of one basic colour and one material, and the words for the whole."""
 
 from __future__ import annotations
 
@@ -21,39 +21,39 @@ from viewsphere.model.thing import Repaint
 Float = NDArray[np.float64]
 
 POINTS = 20_000
-"""Points, spread evenly by area, at which a model is looked at."""
+"""Number of sample points on a model, spread evenly by area."""
 
 CELLS = 32
-"""Along a model's diagonal: of the points in one cell, those that lie no farther than the nearest, but for about a cell, are
-seen.
+"""Number of cells along a model's diagonal for visibility. Within a cell, points at most about a cell behind the nearest one
+are visible.
 """
 
 MOST = 0.55
-"""Share of a surface that a word has to hold for, to hold for all of it: more than this."""
+"""Share of a surface above which a word that applies to this part applies to the whole surface."""
 
 GLASS = 0.5
-"""Share of light let through from which on a patch is glass, and no colour is told of it."""
+"""Transmitted share of light from which a patch is glass, without a colour word."""
 
 METAL = 0.5
-"""`metallic` from which on a patch is metal."""
+"""`metallic` from which a patch is metal."""
 
 GLOSSY = 0.3
-"""Roughness up to which a patch is glossy, and roughness of the clear coat up to which that makes it glossy."""
+"""Roughness of a patch, or of its clear coat, up to which the patch is glossy."""
 
 MATTE = 0.7
-"""Roughness from which on a patch is matte."""
+"""Roughness from which a patch is matte."""
 
 COATED = 0.5
-"""Strength of a clear coat from which on it makes glossy."""
+"""Strength of a clear coat from which it makes a patch glossy."""
 
 INVISIBLE = 0.01
-"""Alpha below which a texel of a blended material is no surface."""
+"""Alpha below which a texel of a blended material does not count as surface."""
 
 DIGITS = 4
-"""Of the numbers of patches."""
+"""Decimal digits of the numbers of patches."""
 
 ROUNDING = 2e-4
-"""By how much numbers of patches may differ that are the same but for rounding."""
+"""Greatest difference between numbers of patches that are equal except for rounding."""
 
 MATERIALS = ("glass", "metal", "glossy", "matte")
 """Words for materials."""
@@ -84,7 +84,7 @@ def appearance_of(mesh: Mesh, color: str | None = None, material: str | None = N
 
 
 def _spread(areas: Float) -> tuple[NDArray[np.int64], Float]:
-    """Points, the same number on equal areas: triangles (N,) and barycentrics (N, 3), of Roberts' sequence R2."""
+    """Sample points with uniform density by area: triangles (N,) and barycentrics (N, 3) from Roberts' sequence R2."""
     number, ends = np.arange(POINTS) + 0.5, np.cumsum(areas)
     triangle = np.searchsorted(ends, number * (ends[-1] / POINTS)).clip(max=len(areas) - 1)
     u, v = number / PLASTIC % 1, number / PLASTIC**2 % 1
@@ -114,7 +114,9 @@ Axes = tuple[tuple[float, float, float], tuple[float, float, float], tuple[float
 
 
 def _directions() -> Iterator[Axes]:
-    """Views from eight sides, each level and from half-way up, and one from above: right, up, and back to the viewer."""
+    """Views from eight sides, both level and from half-way up, and one from above; each as right, up, and back to the
+    viewer.
+    """
     yield (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
     half = 0.5**0.5
     for x, y in ((1, 0), (half, half), (0, 1), (-half, half), (-1, 0), (-half, -half), (0, -1), (half, -half)):
@@ -123,11 +125,11 @@ def _directions() -> Iterator[Axes]:
 
 
 DIRECTIONS = tuple(_directions())
-"""From where a model is looked at."""
+"""The directions from which a model is viewed."""
 
 
 def is_alike(one: Appearance, other: Appearance) -> bool:
-    """Return whether two models look the same but for rounding; what somebody said of them does not count."""
+    """Return whether two models look the same except for rounding; words from specs or sidecars do not count."""
     if [patch.material for patch in one.patches] != [patch.material for patch in other.patches]:
         return False
     pairs = zip(map(_numbers, one.patches), map(_numbers, other.patches), strict=True)
@@ -140,7 +142,9 @@ def _numbers(patch: Patch) -> tuple[float, ...]:
 
 @dataclass(frozen=True)
 class _Spots:
-    """Points of one material: linear colour (N, 3), metallic, roughness, share of light let through (N,), and which count."""
+    """Points of one material: linear colour (N, 3), metallic, roughness, transmitted share of light (N,), and which points
+    count.
+    """
 
     color: Float
     metallic: Float
@@ -150,7 +154,7 @@ class _Spots:
 
 
 def _patches(m: Material, spots: _Spots, weights: Float) -> Iterator[Patch]:
-    """The patches of one material, by its points; shares are sums of their weights."""
+    """The patches of one material, from its points; shares are sums of point weights."""
     coated = m.clearcoat >= COATED and m.clearcoat_roughness <= GLOSSY
     first = nearest_names(spots.color[:1])
     names = np.repeat(first, len(weights)) if _is_plain(spots) else nearest_names(spots.color)
@@ -174,7 +178,7 @@ def _patches(m: Material, spots: _Spots, weights: Float) -> Iterator[Patch]:
 
 
 def _is_plain(spots: _Spots) -> bool:
-    """Return whether all points have one colour, whose name is looked up once."""
+    """Return whether all points have one colour, so that its name is needed only once."""
     return bool((spots.color == spots.color[0]).all())
 
 
@@ -229,7 +233,7 @@ def _index(place: Float, wrap: str, size: int) -> NDArray[np.int64]:
 
 
 def _kinds(spots: _Spots, coated: NDArray[np.bool_] | bool) -> NDArray[np.int64]:
-    """For each point the number of its word in `MATERIALS`, as many as there are for none."""
+    """For each point, the index of its word in `MATERIALS`, or `len(MATERIALS)` for no word."""
     holds = [
         spots.clear >= GLASS,
         spots.metallic >= METAL,
@@ -240,12 +244,12 @@ def _kinds(spots: _Spots, coated: NDArray[np.bool_] | bool) -> NDArray[np.int64]
 
 
 def words(looks: Appearance, repaints: Sequence[Repaint] = ()) -> tuple[str | None, str | None]:
-    """The colour and the material of most of a surface whose materials are repainted so, each None where no word holds for most
-    of it.
+    """The words for the colour and the material of most of a surface with these repaints; None if no word applies to most of
+    it.
 
-    What somebody said of the model counts first, but where it is repainted. A patch that is given a picture has no colour that
-    is known; nor have glass and what else lets half of the light through, whose surface does not count for the colour. One that
-    is made of a substance, as only what is opaque can be, has that one's word and most frequent colour.
+    Words from the spec or sidecar take precedence unless repainted. A patch with a new picture has no known colour. Glass and
+    other patches that transmit half of the light have none either, and their area does not count for the colour. An opaque
+    patch that becomes a substance has the substance's word and most frequent colour.
     """
     colors, materials = dict[str | None, float](), dict[str | None, float]()
     found = [next((r for r in reversed(repaints) if fnmatchcase(p.material, r.material)), None) for p in looks.patches]
@@ -284,6 +288,6 @@ def _materials_of(patches: Sequence[Patch]) -> list[str | None]:
 
 
 def _most(shares: dict[str | None, float]) -> str | None:
-    """The word that holds for more than `MOST` of what is told of, None without one."""
+    """The word that applies to more than `MOST` of the total share, or None."""
     name = max(shares, key=lambda one: shares[one], default=None)
     return name if name is not None and shares[name] > MOST * sum(shares.values()) else None

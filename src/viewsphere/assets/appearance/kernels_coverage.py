@@ -7,7 +7,8 @@ from viewsphere.kernels.jit import inner, njit
 
 @njit
 def add_triangles(steps, corners):
-    """Add triangles (T, 3, 2), in texels, to `steps` (H, W + 1): the sums along a row are how often each texel is covered.
+    """Add triangles (T, 3, 2), in texels, to `steps` (H, W + 1): the running sums along a row count how often each texel is
+    covered.
 
     A texel is covered when its centre lies in a triangle or a triangle's centre in it. The picture repeats;
     triangles start in its first copy and are at most as wide and as high.

@@ -1,4 +1,4 @@
-"""Pictures of surfaces that hide what is behind them, from files that a recipe names."""
+"""Pictures of opaque surfaces, from files that a recipe names."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from viewsphere.errors import RecipeError
 from viewsphere.files import read_bytes
 
 Stamp = tuple[int, int]
-"""A file's size in bytes and its time of change in nanoseconds: another one where the file has changed."""
+"""A file's size in bytes and its modification time in nanoseconds, which differs after the file has changed."""
 
 
 def stamp_of(path: str, field: str) -> Stamp:
-    """The stamp of a file that a recipe's field names; raises RecipeError where there is none."""
+    """The stamp of a file that a recipe's field names; raises RecipeError if the file does not exist."""
     try:
         found = Path(path).stat()
     except OSError as error:
@@ -27,8 +27,8 @@ def stamp_of(path: str, field: str) -> Stamp:
 def opaque_picture(path: str, field: str, *, upright: bool = False, on_white: bool = False) -> NDArray[np.uint8]:
     """The picture in a file that a recipe's field names, (H, W, 4) uint8 sRGB, alpha 255, at most `SHARPEST` texels a side.
 
-    upright: a photograph is turned as its camera says; on_white: what is clear shows white, else its hidden colour. Raises
-    RecipeError for a picture that cannot be read.
+    upright: a photograph is rotated by its EXIF orientation. on_white: transparent parts show white, otherwise their hidden
+    colour. Raises RecipeError for a picture that cannot be read.
     """
     try:
         pixels = reduced(decode_image(read_bytes(Path(path), "MAX_PICTURE_BYTES"), path, upright=upright), SHARPEST)

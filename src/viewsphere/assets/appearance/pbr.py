@@ -1,4 +1,4 @@
-"""Drawn materials as pictures, the same for every engine."""
+"""Procedural materials as pictures, the same for every engine."""
 
 from __future__ import annotations
 
@@ -16,20 +16,20 @@ from viewsphere.model.annotations.procedural_material import ProceduralMaterial
 from viewsphere.model.scene import WHITE, Color
 
 KEPT = 8
-"""Substances whose pictures are kept: 3 MB each of 512 texels a side, 13 MB of 1024."""
+"""Number of substances whose pictures are cached: 3 MB each at 512 texels a side, 13 MB at 1024."""
 
 STRIDE = 251
-"""Of the texels that are looked at for a colour: a prime, which no course of bricks keeps step with."""
+"""Stride between the texels sampled for a colour: a prime, so that it does not align with a brick pattern."""
 
 _LEVELS = 65535
-"""Of light, for which sRGB values are looked up: the darkest byte has 20 of them."""
+"""Levels of light in the table of sRGB values: the darkest byte covers 20 of them."""
 
 Pictures = tuple[Image, Image, Image]
 """Colour; roughness in green and metallic in blue; normals, green up."""
 
 
 def is_replaceable(material: Material) -> bool:
-    """Return whether a material can be replaced by a substance: glass and what has holes stay what they are."""
+    """Return whether a material can be replaced by a substance: glass and materials with holes cannot."""
     return material.alpha_mode == "OPAQUE" and not material.transmission
 
 
@@ -55,7 +55,7 @@ def scaled(material: Material, metres: float) -> Material:
 
 
 def pictures_of(substance: ProceduralMaterial) -> Pictures:
-    """The pictures of a substance; the last ones are kept. Raises UserError for a name that no material has."""
+    """The pictures of a substance; the most recent ones are cached. Raises UserError for an unknown material name."""
     return _pictures(substance.name, substance.seed, substance.size)
 
 
@@ -73,7 +73,7 @@ def _pictures(name: str, seed: int, size: int) -> Pictures:
 
 
 def color_of(substance: ProceduralMaterial, tint: Color | None) -> str | None:
-    """The basic colour that most of a substance has, in light of this tint; None where none has."""
+    """The basic colour of most of a substance with this tint; None if no colour covers most of it."""
     return _color(substance.name, substance.seed, substance.size, tint or WHITE)
 
 

@@ -33,13 +33,12 @@ def repainted(material: Material, repaints: Sequence[Repaint]) -> tuple[Material
 
 
 def textured(mesh: Mesh, repaints: Sequence[Repaint], rest: Mesh | None = None) -> Mesh:
-    """The mesh whose opaque materials have the pictures of the repaints that match them as their colour, or are made of
-    their substance; the mesh itself where none does. Others keep theirs: their clear texels are holes, of which labels know.
+    """The mesh whose opaque materials have the picture or substance of the repaint that matches them; the mesh itself if none
+    matches. Other materials keep their textures, because their clear texels are holes that labels depend on.
 
-    A mesh without texture coordinates gets those of a box for pictures: of each vertex its place along the two axes that its
-    normal faces least, the model's longest side once over the picture. Substances lie on the sides of a box in any case, in
-    metres, and on a deforming model as they do at `rest`. Glass stays glass. Raises RecipeError for a picture that cannot be
-    read.
+    For pictures, a mesh without texture coordinates gets box coordinates: each vertex is projected along the axis that its
+    normal faces most, and the picture spans the model's longest side. Substances always use box coordinates in metres, on a
+    deforming model those at `rest`. Glass stays glass. Raises RecipeError for a picture that cannot be read.
     """
     found = [_found(material, repaints) for material in mesh.materials]
     if not any(one.image or one.texture for one in found):
@@ -65,7 +64,7 @@ def textured(mesh: Mesh, repaints: Sequence[Repaint], rest: Mesh | None = None) 
 
 
 def _found(material: Material, repaints: Sequence[Repaint]) -> Repaint:
-    """The last repaint whose pattern matches, as far as it gives the material a picture or a substance."""
+    """The last matching repaint, reduced to the picture or substance that it gives the material."""
     found = next((r for r in reversed(repaints) if fnmatchcase(material.name, r.material)), None)
     if found is None or material.alpha_mode != "OPAQUE":
         return Repaint()
@@ -73,13 +72,13 @@ def _found(material: Material, repaints: Sequence[Repaint]) -> Repaint:
 
 
 def repaint_stamps(repaints: Iterable[Repaint]) -> tuple[Stamp, ...]:
-    """The stamps of the files that repaints name; raises RecipeError where one is missing."""
+    """The stamps of the files that repaints name; raises RecipeError if one is missing."""
     return tuple(stamp_of(path, FIELD) for path in dict.fromkeys(repaint.image for repaint in repaints) if path is not None)
 
 
 @lru_cache(maxsize=16)
 def _picture(path: str, stamp: Stamp) -> Image:
-    """The picture in a file while the file stays as it is; the last ones are kept."""
+    """The picture in a file, cached while the file is unchanged; the cache holds the last ones."""
     return Image(Path(path).name, opaque_picture(path, FIELD, upright=True))
 
 

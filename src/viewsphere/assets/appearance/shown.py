@@ -12,8 +12,8 @@ def shown_texels(texture: Texture, uv: NDArray[np.float64], shape: tuple[int, ..
     """Texels (H, W) of a picture of this shape that triangles with corners `uv` (T, 3, 2) show: those whose
     centre lies in a triangle, and each triangle's own centre.
 
-    Of a triangle wider than the picture, or beyond the edge of a clamped picture, the whole bounding box counts. The
-    texture's offset and scale apply; the texture must not be rotated or mirrored.
+    For a triangle wider than the picture, or beyond the edge of a clamped picture, the whole bounding box counts. The texture's
+    offset and scale apply; the texture must not be rotated or mirrored.
     """
     from viewsphere.assets.appearance.kernels_coverage import add_triangles
 

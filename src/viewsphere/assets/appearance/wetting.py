@@ -1,4 +1,4 @@
-"""Wet materials: pores that fill with water look darker, and a film of it mirrors (Lekner and Dorf 1988; Lagarde 2013)."""
+"""Wet materials: water in the pores darkens a surface, and a water film reflects (Lekner and Dorf 1988; Lagarde 2013)."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ UPRIGHT = 0.35
 """The wetness of walls as a share of the wetness of surfaces that face up."""
 
 UP = 0.5
-"""z of a normal from which on a surface faces up."""
+"""z of a normal from which a surface faces up."""
 
 DARKEST = 0.42
-"""Share of its colour that a porous surface keeps when it is soaked."""
+"""Share of its colour that a soaked porous surface keeps."""
 
 SMOOTH = 0.12
 """Roughness of a film of water."""
@@ -33,15 +33,16 @@ GREEN = {STUFF_IDS["grass"], STUFF_IDS["vegetation"]}
 
 
 def wetted(mesh: Mesh, amount: float, category: str = "", evenly: bool = False) -> Mesh:
-    """The mesh with wet materials: what faces up in its own axes by `amount`, the rest less, plants without a film. `evenly`:
-    all of it as the rest, as of meshes that deform. `category` says what scenery is made of, see `model.annotations.classes`.
+    """The mesh with wet materials: surfaces that face up in its own axes by `amount`, the others less, plants without a film.
+    `evenly` treats all surfaces like the others, for meshes that deform. `category` gives the classes of scenery, see
+    `model.annotations.classes`.
     """
     if evenly:
         return replace(mesh, materials=tuple(wet(material, amount * UPRIGHT) for material in mesh.materials))
     corners = mesh.vertices[mesh.triangles].astype(np.float64)
     normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     smooth = mesh.normals[mesh.triangles].sum(axis=1)
-    side = np.where((normal * smooth).sum(axis=1) < 0, -1.0, 1.0)  # that of the shading normals
+    side = np.where((normal * smooth).sum(axis=1) < 0, -1.0, 1.0)  # the mean z of the shading normals
     kind = (side * normal[:, 2] > UP * np.linalg.norm(normal, axis=1)).astype(np.int64)
     green = np.array([stuff in GREEN for stuff in stuff_of(category, mesh.parts)])
     kind[green[mesh.triangle_part]] = 2
@@ -53,7 +54,7 @@ def wetted(mesh: Mesh, amount: float, category: str = "", evenly: bool = False) 
 
 
 def wet(material: Material, amount: float, film: float = FILM) -> Material:
-    """A material that is so wet, 0 to 1, with so much of a film of water on it."""
+    """A material with this wetness, 0 to 1, and this share of a water film on it."""
     pores = darkened(material.roughness, material.metallic, amount)
     red, green, blue, alpha = material.base_color
     rough = material.clearcoat_roughness if material.clearcoat > 0 else 1.0
@@ -67,6 +68,6 @@ def wet(material: Material, amount: float, film: float = FILM) -> Material:
 
 
 def darkened(roughness: float, metallic: float, amount: float) -> float:
-    """Share of its colour that a surface keeps: rough ones are porous, metals and lacquers are not."""
+    """Share of its colour that a wet surface keeps: rough surfaces are porous, metals and lacquers are not."""
     porosity = min(max((roughness - 0.5) / 0.4, 0.0), 1.0) * (1 - metallic)
     return 1 + (DARKEST - 1) * porosity * amount

@@ -22,8 +22,8 @@ from viewsphere.model.model_spec import step_key
 def export_glb(mesh: Mesh, path: Path) -> Path:
     """Write the mesh as GLB with all its material fields; returns the path.
 
-    In glTF's axes, an exact permutation of the object's: (x, y, z) becomes (x, z, -y). The triangles of all
-    primitives one after another are `mesh.triangles`. One node a part. Equal meshes give equal bytes.
+    In glTF's axes, an exact permutation of the object's: (x, y, z) becomes (x, z, -y). The concatenated triangles of all
+    primitives are `mesh.triangles`. There is one node per part. Equal meshes give equal bytes.
     """
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_bytes(glb_bytes(mesh))
@@ -32,11 +32,11 @@ def export_glb(mesh: Mesh, path: Path) -> Path:
 
 def export_deforming(model: DeformingMesh, folder: Path, name: str, seconds: Mapping[int, float]) -> None:
     """Write `<name>.glb` with all time steps of a model, and an OBJ of each, `<name>-f0013.obj`, which share `<name>.mtl` and
-    its textures as long as materials stay the same. By frame, `seconds` say when the GLB's animation shows each; without it the
-    first is shown.
+    its textures while materials stay the same. `seconds` gives the time, by frame, at which the GLB's animation shows each
+    step; without playback, the first is shown.
 
-    In the GLB, a time step is a node of the OBJ's name. Each has vertices of its own, exact to the last bit; all else is shared
-    where it is equal. Otherwise as `export_glb` and `export_obj`.
+    In the GLB, a time step is a node with the OBJ's name. Each has its own vertices, exact to the last bit; other equal data is
+    shared. Otherwise as `export_glb` and `export_obj`.
     """
     folder.mkdir(parents=True, exist_ok=True)
     names = {frame: step_key(name, frame) for frame in model.meshes}
@@ -50,13 +50,12 @@ def export_deforming(model: DeformingMesh, folder: Path, name: str, seconds: Map
 
 
 def export_obj(mesh: Mesh, folder: Path, name: str, library: str = "") -> Path:
-    """Write `<name>.obj`, `<name>.mtl` and its textures to the folder; returns the OBJ's path. With the name of a material
-    `library`, which meshes of equal materials and images share, that is written in place of `<name>.mtl`, once.
+    """Write `<name>.obj`, `<name>.mtl` and its textures to the folder; returns the OBJ's path. If the name of a material
+    `library` is given, meshes of equal materials and images share it: it replaces `<name>.mtl` and is written once.
 
-    In object axes (Z up, front -Y, metres), with digits that read back as the same float32. The faces are
-    `mesh.triangles` in order, a group (`g`) a part. MTL keeps base colour, opacity, metallic, roughness,
-    normal, emission and clearcoat; the base colour's texture transform is applied to the coordinates. Equal
-    meshes give equal bytes.
+    In object axes (Z up, front -Y, metres), with digits that read back as the same float32. The faces are `mesh.triangles` in
+    order, with a group (`g`) per part. MTL keeps base colour, opacity, metallic, roughness, normal, emission and clearcoat; the
+    base colour's texture transform is applied to the coordinates. Equal meshes give equal bytes.
     """
     folder.mkdir(parents=True, exist_ok=True)
     names = _plain_names(material.name or "material" for material in mesh.materials)
@@ -95,13 +94,13 @@ def _obj_runs(mesh: Mesh, names: list[str]) -> Iterable[str]:
 
 
 def _spelt(rows: NDArray[np.float32]) -> NDArray[np.object_]:
-    """The shortest digits that give the same float32. A number that occurs often is spelt once."""
+    """The shortest digits that give the same float32. A repeated number is formatted once."""
     bits, which = np.unique(np.ascontiguousarray(rows).view(np.uint32), return_inverse=True)
     return np.array(bits.view(np.float32).astype("U24").tolist(), object)[which.reshape(rows.shape)]
 
 
 def _lines(keyword: str, rows: NDArray[np.object_]) -> str:
-    """One line a row."""
+    """Text with one line per row."""
     return f"{keyword}{' %s' * rows.shape[1]}\n" * len(rows) % tuple(rows.ravel().tolist())
 
 

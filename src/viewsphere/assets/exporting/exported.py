@@ -1,4 +1,4 @@
-"""An exported GLB read back: the very mesh, as far as labels need it, that `glb.glb_bytes` wrote."""
+"""A reader of exported GLB files: it returns the mesh that `glb.glb_bytes` wrote, as far as labels need it."""
 
 from __future__ import annotations
 
@@ -24,12 +24,12 @@ FROM_GLTF = np.array([0, 2, 1]), np.array([1, -1, 1], np.float32)
 
 
 def read_exported(file: Path, parts: Sequence[str], node: str | None = None, *, whole: bool = False) -> Mesh:
-    """The mesh of a GLB file that this package wrote, in object axes; every number is equal to the last bit. Of a model that
+    """The mesh of a GLB file that this package wrote, in object axes; every number is equal to the last bit. For a model that
     deforms, `node` names the time step.
 
-    `parts` names all parts of the model, those without triangles too. Materials that cannot be seen through are left plain, and
-    images that only they use are left out, unless the `whole` mesh is asked for. Raises ModelError for a file that cannot be
-    read, or that has other parts, or no such node.
+    `parts` names all parts of the model, including those without triangles. Unless the `whole` mesh is requested, opaque
+    materials are left plain, and images that only they use are omitted. Raises ModelError for a file that cannot be read, has
+    other parts, or lacks the node.
     """
     document = Document.read(ModelFolder(file))
     step = None if node is None else _step(document, node)
@@ -74,7 +74,7 @@ def _read_images(document: Document) -> None:
 
 
 def _step(document: Document, name: str) -> Field:
-    """The node that is called so and stands for a time step."""
+    """The node of this name, which represents a time step."""
     for node in document.root.items("nodes"):
         if node.text("name") == name and "extras" in node:
             return node
@@ -82,7 +82,7 @@ def _step(document: Document, name: str) -> Field:
 
 
 def _meshes(document: Document, step: Field | None) -> Sequence[Field]:
-    """The parts, or those of one time step."""
+    """The meshes of the parts, or of the parts of one time step."""
     if step is None:
         return document.root.items("meshes")
     nodes = (document.root.at("nodes", int(child.value)) for child in step.items("children"))
@@ -104,7 +104,7 @@ def _primitives(document: Document, meshes: Sequence[Field], parts: Sequence[str
 def _body_parts(
     document: Document, meshes: Sequence[Field], primitives: Sequence[Part]
 ) -> tuple[tuple[str, ...], NDArray[np.int32] | None]:
-    """Names of the parts of the model's body, and the number of each triangle's; None where it has no bones."""
+    """Names of the model's body parts, and the body part number of each triangle; None if it has no bones."""
     if not any(BODY_PARTS in mesh.get("extras") for mesh in meshes):
         return (), None
     names = tuple(str(item.value) for item in meshes[0].get("extras").items(BODY_PARTS))

@@ -1,4 +1,4 @@
-"""A mesh as the bytes of a GLB file (glTF 2.0) with every material field that Mesh keeps."""
+"""A mesh as the bytes of a GLB file (glTF 2.0) with every material field of Mesh."""
 
 from __future__ import annotations
 
@@ -27,26 +27,26 @@ FLOAT, UINT32, UINT8 = 5126, 5125, 5121
 ARRAY_BUFFER, ELEMENT_ARRAY_BUFFER = 34962, 34963
 
 BODY_PARTS = "body_parts"
-"""The member of `extras` that names the parts of a mesh's body, and of a primitive the accessor of each triangle's."""
+"""The member of `extras` that names a mesh's body parts, and for a primitive the accessor with each triangle's body part."""
 
 Object = dict[str, Any]
 
 NEAR = 0.01
-"""Metres from a camera to what a viewer shows; glTF wants some."""
+"""Near plane of cameras, in metres, which glTF requires."""
 
 
 def glb_bytes(mesh: Mesh) -> bytes:
-    """GLB of a mesh in object axes: one node and mesh a part, one primitive a run, in order."""
+    """GLB of a mesh in object axes: one node and mesh per part, one primitive per run, in order."""
     writer = _Writer()
     writer.add_mesh(mesh)
     return writer.packed([{"name": part["name"], "mesh": i} for i, part in enumerate(writer.meshes)])
 
 
 def deforming_glb_bytes(model: DeformingMesh, names: Mapping[int, str], seconds: Mapping[int, float]) -> bytes:
-    """GLB of a model that deforms: a node for each time step, called as `names` say by frame, with a child for each part.
+    """GLB of a model that deforms: a node for each time step, named by `names` (by frame), with a child for each part.
 
-    An animation scales one of them after another from 0 to 1, each at its `seconds`; at rest the first is shown. What has a
-    scale of 0 is not drawn (glTF 2.0, section 3.5.3). `extras` say which materials are the time step's.
+    An animation scales the nodes from 0 to 1 one after another, each at its `seconds`; at rest the first is shown. Nodes with
+    scale 0 are not drawn (glTF 2.0, section 3.5.3). `extras` list the materials of each time step.
     """
     writer = _Writer({})
     steps, parts = list[Object](), list[Object]()
@@ -63,9 +63,9 @@ def deforming_glb_bytes(model: DeformingMesh, names: Mapping[int, str], seconds:
 
 
 def rigged_glb_bytes(model: RiggedModel) -> bytes:
-    """GLB of a rigged model whose first joint alone has none above it: a node with the skin for each part, then one for each
-    joint, and its animations in their order, with a key at each of their times. At rest it stands as `model.rest` says. Equal
-    models give equal bytes.
+    """GLB of a rigged model whose first joint is the only root: a node with the skin for each part, then a node for each joint,
+    and its animations in order, with a key at each of their times. At rest it has the pose `model.rest`. Equal models give
+    equal bytes.
     """
     writer = _Writer({}, skinned=model)
     writer.add_mesh(model.mesh)
@@ -82,13 +82,13 @@ def rigged_glb_bytes(model: RiggedModel) -> bytes:
 
 
 def _y_up(places: NDArray[np.float64]) -> NDArray[np.float32]:
-    """Places (..., 3) of axes with z up in those of glTF."""
+    """Positions (..., 3) converted from axes with z up to glTF's axes."""
     return (places[..., [0, 2, 1]] * (1.0, 1.0, -1.0) + 0.0).astype(np.float32)
 
 
 @dataclass(frozen=True, eq=False)
 class Placed:
-    """A mesh in a scene: its name there, world_from_object (4, 4) of axes with z up, and what is said of it, as JSON."""
+    """A mesh in a scene: its name there, world_from_object (4, 4) in axes with z up, and its extras, as JSON."""
 
     name: str
     mesh: Mesh
@@ -98,8 +98,8 @@ class Placed:
 
 @dataclass(frozen=True, eq=False)
 class Looking:
-    """A camera in a scene: its name there, world_from_camera (4, 4) of axes with z up, x right, y up, z back in the camera, the
-    full angle that it sees from top to bottom, radians, the picture's width by its height, and what is said of it, as JSON.
+    """A camera in a scene: its name there, world_from_camera (4, 4) in axes with z up; the camera's x is right, y up, z back.
+    Also the full vertical field of view in radians, the picture's width divided by its height, and its extras, as JSON.
     """
 
     name: str
@@ -110,8 +110,8 @@ class Looking:
 
 
 def scene_glb_bytes(things: Sequence[Placed], cameras: Iterable[Looking] = ()) -> bytes:
-    """GLB of a scene, y up as glTF has it: a node for each thing, with its pose, its extras and a child for each part, and one
-    for each camera. Things of one mesh share its arrays, cameras of one lens that.
+    """GLB of a scene with y up, as in glTF: a node for each object, with its pose, its extras and a child for each part, and a
+    node for each camera. Objects with one mesh share its arrays, and cameras with one lens share the lens.
     """
     writer, meshes, nodes, parts = _Writer({}), dict[int, range](), list[Object](), list[Object]()
     looking = [writer.camera(camera) for camera in cameras]
@@ -131,7 +131,7 @@ def scene_glb_bytes(things: Sequence[Placed], cameras: Iterable[Looking] = ()) -
 
 
 def _turned(pose: NDArray[np.float64]) -> NDArray[np.float64]:
-    """A pose of axes with z up as one of axes with y up."""
+    """A pose converted from axes with z up to axes with y up."""
     order, signs = [0, 2, 1, 3], np.array([1.0, 1.0, -1.0, 1.0])
     return pose[order][:, order] * signs[:, None] * signs
 
@@ -146,7 +146,7 @@ def material_names(file: Path) -> tuple[str, ...]:
 
 @dataclass(eq=False)
 class _Writer:
-    """`known`: accessors by their content, where equal ones are shared."""
+    """A GLB file in construction. `known`: accessors by their content, so that equal ones are shared."""
 
     known: dict[object, int] | None = None
     binary: io.BytesIO = field(default_factory=io.BytesIO)
@@ -166,7 +166,7 @@ class _Writer:
     first_material: int = 0
 
     def add_mesh(self, mesh: Mesh) -> list[int]:
-        """Add a mesh a part; gives the first and the number of its materials."""
+        """Add one mesh per part; return the index of the first material and their number."""
         last = self.last
         if last is None or mesh.images is not last.images:
             self.first_image = len(self.images)
@@ -210,7 +210,7 @@ class _Writer:
         self.meshes[-1]["primitives"].append(entry)
 
     def camera(self, seen: Looking) -> Object:
-        """The node of a camera, whose own axes are glTF's as they are."""
+        """The node of a camera, whose own axes are already glTF's."""
         lens: Object = {"yfov": seen.yfov, "aspectRatio": seen.aspect, "znear": NEAR}
         number = _index(self.cameras, {"type": "perspective", "perspective": lens})
         matrix = (seen.world_from_camera[[0, 2, 1, 3]] * [[1.0], [1.0], [-1.0], [1.0]]).T.reshape(-1).tolist()
@@ -263,7 +263,9 @@ class _Writer:
         return len(self.views) - 1
 
     def accessor(self, rows: NDArray[Any], kind: str, bounded: bool = False, target: int | None = ARRAY_BUFFER) -> int:
-        """Put an array into the file; `target` says what reads it, if it is no index; None: nothing of glTF."""
+        """Add an array to the file; return its accessor. `target` is glTF's buffer target for arrays other than indices; None:
+        glTF itself does not use the array.
+        """
         is_float, is_byte = rows.dtype == np.float32, rows.dtype == np.uint8
         data = np.ascontiguousarray(rows, "<f4" if is_float else "u1" if is_byte else "<u4")
         content = kind, bounded, is_float, is_byte, target, hashlib.sha256(data.tobytes()).digest()
@@ -379,7 +381,7 @@ class _Writer:
         return found
 
     def packed(self, nodes: Sequence[Object], roots: int | None = None) -> bytes:
-        """The whole file, with these nodes: the first so many (None: all) are the scene's."""
+        """The whole file, with these nodes: the first `roots` (None: all) are the scene's root nodes."""
         images: list[Object] = []
         for image in self.images:
             images.append(

@@ -1,4 +1,4 @@
-"""RiggedModel: a mesh that joints bend, and what it does, as a GLB file that any reader of glTF plays."""
+"""RiggedModel: a mesh bent by joints, with animations, as a GLB file that any glTF viewer plays."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ class Pose:
 
 @dataclass(frozen=True, eq=False)
 class Clip:
-    """An animation: a pose at each of some `seconds`, and what else is said of it, plain data for a file's `extras`."""
+    """An animation: a pose at each of some `seconds`, and further facts as plain data for a file's `extras`."""
 
     seconds: tuple[float, ...]
     poses: tuple[Pose, ...]
@@ -36,9 +36,9 @@ class Clip:
 
 @dataclass(frozen=True, eq=False)
 class RiggedModel:
-    """A mesh in its bind pose (object axes, metres) and its rig: names and `places` (J, 3) of joints, the joint above each
-    (-1: none; parents first), the joints (V, 4) that move each vertex, and their weights (V, 4), which sum to 1. `rest` is how
-    the model stands where no animation is played.
+    """A mesh in its bind pose (object axes, metres) and its rig: names and `places` (J, 3) of joints, the joint above each (-1:
+    none; parents first), the joints (V, 4) that move each vertex, and their weights (V, 4), which sum to 1. `rest` is the pose
+    without an animation.
     """
 
     mesh: Mesh
@@ -56,7 +56,7 @@ class RiggedModel:
 
 
 def joints_at(places: Float, above: tuple[int, ...], pose: Pose) -> Float:
-    """Matrices (J, 4, 4) of joints in the mesh's axes: how each is turned, and where it is."""
+    """Matrices (J, 4, 4) of joints in the mesh's axes: their rotations and positions."""
     found = list[Float]()
     for i, parent in enumerate(above):
         if parent < 0:
@@ -67,7 +67,7 @@ def joints_at(places: Float, above: tuple[int, ...], pose: Pose) -> Float:
 
 
 def quaternions(turns: Float) -> NDArray[np.float32]:
-    """Quaternions (N, 4), x, y, z, w, of rotations (N, 3, 3) that follow one another: no sign changes on the way. In glTF's
+    """Quaternions (N, 4), x, y, z, w, of successive rotations (N, 3, 3), without sign flips between them. They are in glTF's
     axes, in which (x, y, z) is (x, z, -y).
     """
     found = np.array([quaternion_from_matrix(turn) for turn in turns])

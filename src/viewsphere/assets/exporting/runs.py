@@ -14,7 +14,7 @@ from viewsphere.assets.mesh import Mesh
 
 @dataclass(frozen=True, eq=False)
 class Run:
-    """Triangles of one part and material, from the mesh's `first` one on, with vertices of their own.
+    """Triangles of one part and material, starting at the mesh's triangle `first`, with their own vertices.
 
     `vertices` (n,) int32 index the mesh's vertices; `triangles` (t, 3) int32 index `vertices`.
     """
@@ -27,7 +27,7 @@ class Run:
 
 
 def runs(mesh: Mesh) -> Iterator[Run]:
-    """Runs of the mesh's triangles, in order; a new run begins where part or material changes."""
+    """Runs of the mesh's triangles, in order; a new run begins when the part or material changes."""
     change = np.diff(mesh.triangle_part) | np.diff(mesh.triangle_material)
     starts = [0, *(np.flatnonzero(change) + 1).tolist(), len(mesh.triangles)]
     for start, stop in pairwise(starts):

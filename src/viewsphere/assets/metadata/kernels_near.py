@@ -1,4 +1,4 @@
-"""Distances of points from triangles that lie in the cells of a grid.
+"""Distances of points from triangles, which a grid of cells indexes.
 
 A grid is a tuple: corners of the triangles (T, 3, 3), starts of the cells (X * Y * Z + 1,) in the members, triangles by cells;
 the grid's lowest corner (3,), the side of a cell, and the numbers of cells (X, Y, Z). It covers all triangles.
@@ -11,8 +11,8 @@ from viewsphere.kernels.jit import inner, njit
 
 @njit
 def into_cells(corners, low, cell, counts, members, fills):
-    """Count in (X, Y, Z) int64 the triangles (T, 3, 3) that each cell may hold some of; or, where `fills`, write their numbers
-    before the places in `counts`, which move to the first of them.
+    """Count in (X, Y, Z) int64 the triangles (T, 3, 3) that may intersect each cell. With `fills`, write their numbers before
+    the positions in `counts` instead, which then move to the first of them.
     """
     for t in range(len(corners)):
         _visit(corners, t, low, cell, counts, members, fills)
@@ -20,7 +20,7 @@ def into_cells(corners, low, cell, counts, members, fills):
 
 @inner
 def _visit(corners, t, low, cell, counts, members, fills):
-    """Count or write a triangle in each cell of its box that its plane goes through."""
+    """Count or write a triangle in each cell of its bounding box that its plane intersects."""
     ax, ay, az = corners[t, 0, 0], corners[t, 0, 1], corners[t, 0, 2]
     bx, by, bz = corners[t, 1, 0], corners[t, 1, 1], corners[t, 1, 2]
     cx, cy, cz = corners[t, 2, 0], corners[t, 2, 1], corners[t, 2, 2]
@@ -45,7 +45,7 @@ def _visit(corners, t, low, cell, counts, members, fills):
 
 @inner
 def _between(low, high, start, cell, count):
-    """The first cell of a row that a range meets, and the one after the last."""
+    """The first cell of a row that a range overlaps, and the cell after the last."""
     first = max(math.floor((low - start) / cell), 0)
     end = min(math.floor((high - start) / cell) + 1, count)
     return first, end
@@ -53,7 +53,7 @@ def _between(low, high, start, cell, count):
 
 @njit
 def all_near(points, motions, grid, limit, near):
-    """For each motion (M, 3, 4) whether it moves all points (N, 3) to within `limit` of a triangle."""
+    """Fill `near` with whether each motion (M, 3, 4) moves all points (N, 3) to within `limit` of a triangle."""
     for m in range(len(motions)):
         near[m] = True
         for p in range(len(points)):
@@ -65,8 +65,8 @@ def all_near(points, motions, grid, limit, near):
 
 @njit
 def closest(points, motion, grid, limit, found):
-    """For each point, moved, the square of its distance from the nearest triangle within `limit`, else infinity; the point
-    there and the triangle's unit normal: found (N, 7).
+    """Fill found (N, 7) for each moved point: the squared distance to the nearest triangle within `limit`, else infinity; the
+    nearest point on it; and the triangle's unit normal.
     """
     for p in range(len(points)):
         x, y, z = _moved(motion, points[p])
@@ -88,10 +88,10 @@ def _moved(m, p):
 
 @inner
 def _nearest(x, y, z, grid, limit, enough):
-    """The square of the distance to the nearest triangle within `limit` (infinity without one), its number, and the point
-    there; stops at the first triangle within `enough`.
+    """The squared distance to the nearest triangle within `limit` (infinity without one), its number, and its nearest point.
+    The search stops at the first triangle within `enough`.
 
-    Reads the point's own cell first: its nearest triangle bounds the search of the other cells.
+    The point's own cell comes first, since its nearest triangle bounds the search of the other cells.
     """
     low, cell, (width, depth, height) = grid[3], grid[4], grid[5]
     i, j, k = _place(x, low[0], cell, width), _place(y, low[1], cell, depth), _place(z, low[2], cell, height)
@@ -105,7 +105,7 @@ def _nearest(x, y, z, grid, limit, enough):
 
 @inner
 def _place(x, start, cell, count):
-    """The cell of a row that a coordinate lies in, or the nearest one."""
+    """The cell of a row that contains a coordinate, or the nearest cell."""
     return min(max(math.floor((x - start) / cell), 0), count - 1)
 
 
@@ -133,14 +133,14 @@ def _in_cells(x, y, z, grid, own, reach, enough, best):
 
 @inner
 def _gap(x, start, cell):
-    """The square of a coordinate's distance from a cell's range."""
+    """The squared distance of a coordinate from a cell's range."""
     gap = max(start - x, x - start - cell, 0.0)
     return gap * gap
 
 
 @inner
 def _in_cell(x, y, z, grid, number, enough, best):
-    """The better of `best` and the nearest triangle of a cell: the square of the distance, the triangle, the point there."""
+    """The better of `best` and the nearest triangle of a cell: the squared distance, the triangle, and its nearest point."""
     corners, starts, members = grid[0], grid[1], grid[2]
     for place in range(starts[number], starts[number + 1]):
         t = members[place]
@@ -155,7 +155,9 @@ def _in_cell(x, y, z, grid, number, enough, best):
 
 @njit
 def into_field(grid, low, step, limit, field):
-    """Write the distances of points (X, Y, Z), `step` apart from `low` on, from the nearest triangle: `limit` beyond it."""
+    """Write the distances of grid points (X, Y, Z), `step` apart from `low` on, from the nearest triangle; larger ones become
+    `limit`.
+    """
     for i in range(field.shape[0]):
         for j in range(field.shape[1]):
             for k in range(field.shape[2]):
@@ -165,8 +167,8 @@ def into_field(grid, low, step, limit, field):
 
 @njit
 def field_misfits(points, motions, field, low, step, most, found):
-    """For each motion (M, 3, 4) the sum of squares of the distances that a field gives moved points; infinity where one of them
-    is more than `most`.
+    """Fill `found` with the sum of squared field distances of the moved points for each motion (M, 3, 4), or infinity if one
+    distance exceeds `most`.
     """
     width, depth, height = field.shape
     for m in range(len(motions)):
@@ -198,7 +200,7 @@ def _between_nodes(field, i, j, k, u, v, w):
 
 @inner
 def _on_triangle(corners, x, y, z):
-    """The point of a triangle that is nearest to a point: Ericson, Real-Time Collision Detection, 5.1.5."""
+    """The nearest point of a triangle to a point: Ericson, Real-Time Collision Detection, 5.1.5."""
     ax, ay, az = corners[0, 0], corners[0, 1], corners[0, 2]
     ux, uy, uz = corners[1, 0] - ax, corners[1, 1] - ay, corners[1, 2] - az
     vx, vy, vz = corners[2, 0] - ax, corners[2, 1] - ay, corners[2, 2] - az

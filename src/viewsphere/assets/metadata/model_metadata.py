@@ -1,4 +1,4 @@
-"""The metadata of a model, from its sidecar or its own file; otherwise found on its surface, where the spec requests it."""
+"""The metadata of a model, from its sidecar or its own file, or else computed from its surface if the spec requests it."""
 
 from __future__ import annotations
 
@@ -32,14 +32,14 @@ Float = NDArray[np.float64]
 
 
 BEYOND = 0.1
-"""Share of its diameter by which a point that a model names may lie outside of its box."""
+"""Distance, as a share of the diameter, by which a named point may be outside of the model's box."""
 
 
 def metadata_of(spec: ModelSpec, mesh: Mesh, facts: FileFacts, step: TimeStep | None = None) -> ModelMetadata:
     """Return the metadata of a normalised model at a time step (None: at rest); `facts` are its file's facts.
 
-    Raises ModelError, which names the sidecar and the field, for a sidecar that cannot be read. The same holds for a symmetry
-    that the surface does not have, and for points far outside of its box.
+    Raises ModelError, which names the sidecar and the field, for an unreadable sidecar, for a symmetry that the surface does
+    not have, and for points far outside of its box.
     """
     across = diameter(mesh.corners)
     path, sidecar = said_of(spec)
@@ -62,7 +62,7 @@ def metadata_of(spec: ModelSpec, mesh: Mesh, facts: FileFacts, step: TimeStep | 
 
 
 def with_body_parts(mesh: Mesh, spec: ModelSpec) -> Mesh:
-    """The mesh with those parts of its body that its sidecar names. Raises ModelError for bones that its skin does not have."""
+    """The mesh with the body parts that its sidecar names. Raises ModelError for bones that its skin does not have."""
     path, sidecar = said_of(spec)
     parts = sidecar.body_parts
     if parts is None:
@@ -77,7 +77,7 @@ def with_body_parts(mesh: Mesh, spec: ModelSpec) -> Mesh:
 
 
 def found_symmetries(mesh: Mesh) -> Symmetries:
-    """The symmetries of a mesh's surface; from the cache, where they have been looked for before."""
+    """The symmetries of a mesh's surface, from the cache if they were computed before."""
     digest = hashlib.sha256(readers_digest().encode())
     for array in (mesh.vertices, mesh.triangles):
         digest.update(repr(array.shape).encode() + array.tobytes())
@@ -91,7 +91,7 @@ def found_symmetries(mesh: Mesh) -> Symmetries:
 
 
 def far_points(mesh: Mesh, across: float, keypoints: Keypoints) -> Iterator[str]:
-    """Points outside of a mesh's box by more than `BEYOND` of its diameter: what is wrong with each."""
+    """Yield an error message for each point outside of a mesh's box by more than `BEYOND` of its diameter."""
     low, high = mesh.bounds
     for name, place in keypoints.points.items():
         off = float(np.maximum(low - place, np.array(place) - high).max())
@@ -112,7 +112,7 @@ def _in_object_axes(said: Sidecar, facts: FileFacts) -> Sidecar:
 
 
 def _own(mesh: Mesh, across: float, facts: FileFacts) -> Keypoints | None:
-    """The points that the model's file names, but for those far outside of it."""
+    """The points that the model's file names, except those far outside of the model."""
     if facts.keypoints is None:
         return None
     found = facts.keypoints.moved(facts.object_from_file)
@@ -131,7 +131,7 @@ def spread_points(vertices: Float, count: int) -> Float:
     """Up to `count` of the vertices (N, 3), each the farthest from those before it and from the middle of the box.
 
     Farthest-point sampling, with the middle as its start, as PVNet picks its keypoints (Peng et al. 2019, section 3.1). Equal
-    vertices give equal points, in whatever order they come; of vertices that are equally far the first by x, y, z counts.
+    vertices give equal points, regardless of their order. Among equally far vertices, the first by x, y, z counts.
     """
     vertices = np.unique(vertices, axis=0)
     away = _squares(vertices - (vertices.min(axis=0) + vertices.max(axis=0)) / 2)

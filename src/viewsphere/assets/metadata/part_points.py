@@ -1,4 +1,4 @@
-"""Named points of models that are known by the names of their parts: those of families."""
+"""Named points of model families, located by the names of the models' parts."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from viewsphere.model.annotations.keypoints import At, Keypoints, Pair, Place, l
 
 
 def part_points(mesh: Mesh, places: Mapping[str, At], skeleton: Sequence[Pair] = ()) -> Keypoints | None:
-    """The points of a mesh, in its axes: those whose parts it has, and the lines between them; None without any."""
+    """The points of a mesh, in its axes, for the parts that it has, and the lines between them; None without any."""
     found = {name: place for name, at in places.items() if (place := _place(mesh, at)) is not None}
     if not found:
         return None

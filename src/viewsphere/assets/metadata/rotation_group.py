@@ -1,4 +1,4 @@
-"""Finite groups of rigid motions, from motions that are only near to a group's."""
+"""Finite groups of rigid motions, reconstructed from motions that only approximate a group."""
 
 from __future__ import annotations
 
@@ -12,26 +12,30 @@ from viewsphere.geometry.rotation import Float, product, rotation_about
 
 Ints = NDArray[np.intp]
 Holds = Callable[[Float], NDArray[np.bool_]]
-"""For motions (N, 4, 4), which of them are symmetries."""
+"""A function that returns a mask of the symmetries among motions (N, 4, 4)."""
 
 SAME = 1 / 3
-"""Share of the least angle between two elements within which a product is one of them: below a half, so that it is only one."""
+"""Tolerance for identifying a product with an element, as a share of the least angle between two elements. It is below a half,
+so that the match is unique.
+"""
 
 CLOSED = 1e-6
-"""Largest distance of a product's entries from those of the listed motion: they are listed with nine digits."""
+"""Greatest difference between the entries of a product and of the listed motion, which has nine digits."""
 
 LARGEST = 64
-"""Elements of a completed group. The largest ones searched for are the icosahedron's, of 60, and a 16-sided prism's, of 32."""
+"""Greatest number of elements of a completed group. The largest groups in the search are the icosahedron's with 60 and a
+16-sided prism's with 32.
+"""
 
 ROUNDS = 20
-"""Averages of a group's elements; each squares the distance from an exact group, so few are needed."""
+"""Averaging rounds of a group's elements. Each squares the distance from an exact group, so few are needed."""
 
 
 def largest_group(motions: Float, holds: Holds, nearly: Holds, axes: Float, snap: float) -> Float:
     """The largest group (N, 4, 4) of symmetries among motions and their products, without the identity.
 
-    Motions that already are a group stay as they are. All others become an exact group, turned so that its axes equal those of
-    `axes` (M, 3) from which they are at most `snap` radians away. `nearly` allows for inexact products.
+    Motions that already form a group are unchanged. Others become an exact group, rotated so that its axes equal those `axes`
+    (M, 3) that are at most `snap` radians away. `nearly` allows for inexact products.
     """
     listed = np.concatenate([np.eye(4)[None], motions])
     if is_group(listed) and holds(listed).all():
@@ -48,7 +52,7 @@ def largest_group(motions: Float, holds: Holds, nearly: Holds, axes: Float, snap
 
 
 def is_group(motions: Float) -> bool:
-    """Return whether motions (N, 4, 4), the identity among them, hold all their products."""
+    """Return whether motions (N, 4, 4), which include the identity, contain all their products."""
     table, turns = _table(motions), motions[:, :3, :3]
     return bool((table >= 0).all() and np.abs(_products(turns) - turns[table]).max() <= CLOSED)
 
@@ -65,19 +69,19 @@ def _separation(turns: Float) -> float:
 
 
 def _nearest(turns: Float, to: Float, same: float) -> Ints:
-    """For rotations (..., 3, 3) the place of the one of `to` (N, 3, 3) within `same` radians; -1 if there is none."""
+    """For rotations (..., 3, 3), the index of the rotation in `to` (N, 3, 3) within `same` radians; -1 if there is none."""
     traces = np.einsum("...ij,nij->...n", turns, to)
     return np.where(traces.max(axis=-1) >= 1 + 2 * math.cos(same), traces.argmax(axis=-1), -1)
 
 
 def _table(motions: Float) -> Ints:
-    """The places (N, N) of the products of motions; -1 where the product is not listed."""
+    """The indices (N, N) of the products of motions; -1 where the product is not listed."""
     turns = motions[:, :3, :3]
     return _nearest(_products(turns), turns, SAME * _separation(turns))
 
 
 def _completed(elements: Float, holds: Holds) -> Float:
-    """The elements with all products that are symmetries as well; as they were if these are too many for a group."""
+    """The elements with all products that are symmetries as well; unchanged if these are too many for a group."""
     grown = elements
     while len(grown) <= LARGEST:
         missing = _missing(grown)
@@ -101,7 +105,7 @@ def _missing(elements: Float) -> Float:
 
 
 def _subgroups(table: Ints) -> Iterator[Ints]:
-    """The places of the members of subgroups, the identity first, the largest subgroup first.
+    """Yield the indices of the members of each subgroup, the identity first; the largest subgroup comes first.
 
     Two elements generate every finite group of rotations, so pairs of elements find them all.
     """
@@ -112,7 +116,7 @@ def _subgroups(table: Ints) -> Iterator[Ints]:
 
 
 def _generated(table: Ints, *generators: int) -> tuple[int, ...]:
-    """The places of all products of generators; empty if one is not listed."""
+    """The indices of all products of generators; empty if a product is not listed."""
     members = np.unique([0, *generators])
     while True:
         products = np.unique(table[np.ix_(members, members)])
@@ -124,10 +128,10 @@ def _generated(table: Ints, *generators: int) -> tuple[int, ...]:
 
 
 def _exact(elements: Float, table: Ints) -> Float | None:
-    """The exact group near to elements; None where their products are those of no group.
+    """The exact group near the elements; None if their products do not form a group.
 
-    Each rotation is the mean of all products that equal it. The centre is the mean of the places to which the elements take a
-    point, and so fixed.
+    Each rotation is the mean of all products that equal it. The centre is the mean of a point's images under all elements, so
+    every element leaves it fixed.
     """
     if (table < 0).any() or (np.sort(table, axis=1) != np.arange(len(table))).any():
         return None
@@ -141,7 +145,7 @@ def _exact(elements: Float, table: Ints) -> Float | None:
 
 
 def _places(motions: Float, point: Float) -> Float:
-    """The places (N, 3) to which motions (N, 4, 4) take a point."""
+    """The images (N, 3) of a point under motions (N, 4, 4)."""
     return (motions[:, :3, :3] * point).sum(axis=2) + motions[:, :3, 3]
 
 
@@ -159,7 +163,7 @@ def _rotations(matrices: Float) -> Float:
 
 
 def _aligned(group: Float, axes: Float, snap: float) -> Float:
-    """The group turned around its centre, so that axes of its rotations equal the given ones they are near to."""
+    """The group turned around its centre, so that its rotation axes equal the given axes that they are near."""
     center, fixed = _places(group, np.zeros(3)).mean(axis=0), list[Float]()
     turns = group[:, :3, :3]
     for axis in axes:
@@ -173,13 +177,13 @@ def _aligned(group: Float, axes: Float, snap: float) -> Float:
 
 
 def _axis(turn: Float, near: Float) -> Float:
-    """The axis of a rotation, in the direction nearer to another."""
+    """The axis of a rotation, with the sign that is nearer to the direction `near`."""
     axis = np.linalg.svd(turn - np.eye(3))[2][2]
     return axis * np.sign(float((axis * near).sum()) or 1.0)
 
 
 def _shortest(one: Float, other: Float) -> Float:
-    """The shortest rotation that takes a direction to another."""
+    """The shortest rotation from one direction to another."""
     cross = np.cross(one, other)
     sine = math.sqrt(float((cross * cross).sum()))
     return rotation_about(cross * (math.asin(min(sine, 1.0)) / sine)) if sine > 1e-15 else np.eye(3)

@@ -1,4 +1,4 @@
-"""The file beside a model that says its symmetries, points and parts."""
+"""The sidecar file of a model, which declares its symmetries, points and parts."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from viewsphere.recipe.reading.sidecar import ENDING, Sidecar, read_sidecar
 
 
 def said_of(spec: ModelSpec) -> tuple[Path | None, Sidecar]:
-    """A model's sidecar and what it says; an empty one where there is none, and of a part of a file.
+    """The path and the content of a model's sidecar. The content is empty if there is none, or for a part of a file.
 
-    Raises ModelError for one that cannot be read.
+    Raises ModelError for an unreadable sidecar.
     """
     path = None if spec.parts is not None else sidecar_of(spec)
     try:
@@ -24,10 +24,9 @@ def said_of(spec: ModelSpec) -> tuple[Path | None, Sidecar]:
 
 
 def sidecar_of(spec: ModelSpec) -> Path | None:
-    """The file that says symmetries, points and parts of a model: that which the recipe names, else the one beside it; None
-    without.
+    """The sidecar file of a model: the one named in the recipe, else the one beside the model; None without one.
 
-    Raises ModelError for one beside it that is a link out of the folder of a confined model.
+    Raises ModelError if the sidecar beside a confined model is a link out of the model's folder.
     """
     if spec.sidecar is not None:
         return Path(spec.sidecar)

@@ -1,4 +1,4 @@
-"""The stuff classes of scenery, by categories and names of parts."""
+"""The stuff classes of scenery, from categories and part names."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from viewsphere.plugins.source import families_named
 def stuff_of(category: str, parts: Sequence[str]) -> list[int]:
     """The classes of the parts of scenery of a category.
 
-    A family of models with the category's name states the classes of its parts. Elsewhere names decide: of a part, else of its
-    category, without numbers at their end and what comes before a slash: Road.001 is road. Else it is scenery.
+    A family of models with the category's name declares the classes of its parts. Otherwise the name of the part decides, or
+    else the category's, without trailing numbers and without the text before a slash: Road.001 is road. The default is scenery.
     """
     family = next(families_named(category.replace(" ", "_")), None)
     if family is not None:

@@ -1,4 +1,4 @@
-"""A model's surface as something to measure distances from, and points that stand for it."""
+"""A model's surface for distance measurements, and points that represent it."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from viewsphere.geometry.diameter import diameter
 Float = NDArray[np.float64]
 
 SPREAD = 2000
-"""Points that are spread over the surface, and most of its vertices that are taken with them."""
+"""Number of points spread over the surface, and the greatest number of vertices added to them."""
 
 FINEST = 64
 """Cells along the diameter."""
@@ -25,7 +25,7 @@ FINEST = 64
 
 @dataclass(frozen=True, eq=False)
 class DistanceField:
-    """Distances from a surface (X, Y, Z) float32 at nodes `step` metres apart from `start` on, those up to `most` at least."""
+    """Distances from a surface (X, Y, Z) float32 at nodes `step` metres apart from `start` on, valid at least up to `most`."""
 
     nodes: NDArray[np.float32]
     start: Float
@@ -33,8 +33,8 @@ class DistanceField:
     most: float
 
     def misfits(self, motions: Float, points: Float) -> Float:
-        """For each motion (M, 4, 4) about the sum of squares of the distances of moved points (N, 3) from the surface; infinite
-        only where a point is farther than the field's limit. Costs the same for any number of triangles.
+        """The approximate sum of squared distances of moved points (N, 3) from the surface, for each motion (M, 4, 4). It is
+        infinite only if a point is beyond the field's limit. The cost does not depend on the number of triangles.
         """
         from viewsphere.assets.metadata.kernels_near import field_misfits
 
@@ -45,13 +45,13 @@ class DistanceField:
 
 @dataclass(frozen=True, eq=False)
 class Surface:
-    """Triangles with some area, by their corners (T, 3, 3) float64, metres in the object's axes."""
+    """The triangles with non-zero area: their corners (T, 3, 3) float64, metres in the object's axes."""
 
     corners: Float
 
     @staticmethod
     def of(mesh: Mesh) -> Surface:
-        """The surface of a mesh; what it looks like does not count."""
+        """The surface of a mesh, without its materials."""
         corners = mesh.vertices.astype(np.float64)[mesh.triangles]
         solid = (face_normals(mesh.vertices.astype(np.float64), mesh.triangles) != 0).any(axis=1)
         return Surface(np.ascontiguousarray(corners[solid]))
@@ -63,18 +63,18 @@ class Surface:
 
     @cached_property
     def areas(self) -> Float:
-        """Of the triangles (T,), square metres."""
+        """The areas of the triangles (T,), square metres."""
         a, b, c = (self.corners[:, i] for i in range(3))
         return np.sqrt((np.cross(b - a, c - a) ** 2).sum(axis=1)) / 2
 
     @cached_property
     def center(self) -> Float:
-        """The centroid of the surface (3,): every symmetry leaves it where it is."""
+        """The centroid of the surface (3,): every symmetry leaves it fixed."""
         return (self.areas[:, None] * self.corners.mean(axis=1)).sum(axis=0) / self.areas.sum()
 
     @cached_property
     def spread(self) -> Float:
-        """The second moments (3, 3) of the surface about its centroid, square metres: what a symmetry leaves as they are."""
+        """The second moments (3, 3) of the surface about its centroid, square metres. Symmetries leave them unchanged."""
         around = self.corners - self.center
         around = np.concatenate([around, 3 * around.mean(axis=1, keepdims=True)], axis=1)
         share = self.areas / (12 * self.areas.sum())
@@ -82,8 +82,8 @@ class Surface:
 
     @cached_property
     def points(self) -> Float:
-        """Points (N, 3) that stand for the surface: some spread evenly over its area, and vertices, in a mixed order. Equal
-        surfaces have equal points.
+        """Points (N, 3) that represent the surface: evenly spread points and vertices, in a mixed order. Equal surfaces have
+        equal points.
         """
         vertices = np.unique(self.corners.reshape(-1, 3), axis=0)
         vertices = vertices[:: -(-len(vertices) // SPREAD)]
@@ -91,7 +91,7 @@ class Surface:
         return np.ascontiguousarray(points[np.random.default_rng(0).permutation(len(points))])
 
     def _even(self, count: int) -> Float:
-        """So many points, the same number on equal areas: of Roberts' sequence R2, folded into the triangles."""
+        """`count` points with uniform density by area, from Roberts' sequence R2, folded into the triangles."""
         number = np.arange(count) + 0.5
         ends = np.cumsum(self.areas)
         triangle = np.searchsorted(ends, number * (ends[-1] / count)).clip(max=len(ends) - 1)
@@ -103,10 +103,10 @@ class Surface:
         return a + u * (b - a) + v * (c - a)
 
     def are_near(self, motions: ArrayLike, limit: float, points: Float | None = None) -> NDArray[np.bool_]:
-        """For each motion (M, 4, 4) whether it moves all points (by default the surface's own) to within `limit` metres of the
+        """A mask of the motions (M, 4, 4) that move all points (by default the surface's own) to within `limit` metres of the
         surface.
         """
-        from viewsphere.assets.metadata.kernels_near import all_near  # numba, which what starts workers does without
+        from viewsphere.assets.metadata.kernels_near import all_near  # imports numba, which the code that starts workers avoids
 
         motions = np.ascontiguousarray(np.asarray(motions, np.float64)[:, :3])
         near = np.zeros(len(motions), np.bool_)
@@ -114,8 +114,8 @@ class Surface:
         return near
 
     def closest(self, points: Float, motion: Float, limit: float) -> tuple[Float, Float, Float]:
-        """For points (N, 3) that are moved by (4, 4): squares (N,) of their distances from the surface, infinite beyond
-        `limit`; the nearest points (N, 3) of the surface and its unit normals (N, 3) there.
+        """For points (N, 3) moved by (4, 4): their squared distances (N,) from the surface, infinite beyond `limit`; the
+        nearest points (N, 3) of the surface; and the unit normals (N, 3) there.
         """
         from viewsphere.assets.metadata.kernels_near import closest
 
@@ -137,7 +137,7 @@ class Surface:
 
     @cached_property
     def _grid(self) -> tuple[Any, ...]:
-        """The triangles in cells, as kernels ask for them."""
+        """The triangles in a grid of cells, in the form that kernels expect."""
         from viewsphere.assets.metadata.kernels_near import into_cells
 
         low, high = self.corners.min(axis=(0, 1)), self.corners.max(axis=(0, 1))

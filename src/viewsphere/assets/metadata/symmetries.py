@@ -1,7 +1,7 @@
-"""Symmetries of a model's surface, found from its triangles, and declared ones that it does not have.
+"""Detection of the symmetries of a model's surface from its triangles, and checks of declared symmetries.
 
-Only geometry counts: a surface that looks different after a turn, by its texture or materials, is symmetric here. What lies
-inside of a model, where nobody sees it, counts as well.
+Only geometry counts: a surface whose texture or materials differ after a turn is symmetric here. Invisible geometry inside of a
+model counts as well.
 """
 
 from __future__ import annotations
@@ -40,39 +40,41 @@ from viewsphere.model.scene import Matrix4, Vector
 Float = NDArray[np.float64]
 
 ORDERS = tuple(range(2, 17))
-"""The numbers of equal turns that make a full turn of a model onto itself. A prism of more sides counts as round within
+"""The numbers of equal turns that make a full turn of a model onto itself. A prism with more sides is round within
 `TOLERANCE`.
 """
 
 PRIMES = {13: 1, 11: 1, 7: 1, 5: 8, 3: 12, 2: 18}
-"""An axis of any of these orders has a turn of one of these, for which the search looks; and the most axes with such a turn
-that it collects: at least those of a finite group (an icosahedron has 6 and 10, a 16-sided prism 17, and one of more than 5).
-Surfaces that are round but for noise near the tolerance seem to have hundreds.
+"""Prime orders that the search tries, each with the greatest number of axes that it collects. Every axis of one of the `ORDERS`
+has a turn of a prime order. The limits cover all finite groups (an icosahedron has 6 and 10 axes, a 16-sided prism 17, and one
+of an order above 5). Surfaces that are round except for noise near the tolerance appear to have hundreds of axes.
 """
 
 GOLDEN = math.pi * (3 - math.sqrt(5))
 """Radians: multiples of this angle come near to every angle."""
 
 TURNS = 16
-"""Turns by multiples of `GOLDEN` that are tried of an axis around which every turn may be a symmetry."""
+"""Number of turns, by multiples of `GOLDEN`, that are tried to prove that every turn around an axis is a symmetry."""
 
 ALIKE = 0.1
-"""Share of the largest moment by which two moments of the surface differ at most where an axis between theirs may be one."""
+"""Two moments of the surface count as equal if they differ by at most this share of the largest moment. Then directions between
+their axes are candidates, too.
+"""
 
 AXES = 40_000
-"""Directions of half a ball, about 0.01 radians apart."""
+"""Number of candidate directions on a half sphere, about 0.01 radians apart."""
 
 SOLIDS = (59, 23, 11)
-"""Turns of the icosahedron, the cube and the tetrahedron. A surface that is round but for noise or bumps near the tolerance has
-other turns beside these, of no group.
+"""Numbers of turns of the icosahedron, the cube and the tetrahedron. A surface that is round except for noise or bumps near the
+tolerance has further turns that form no group.
 """
 
 RANKED = 128
-"""Points by which directions of the half ball are ranked."""
+"""Number of points for ranking the directions of the half sphere."""
 
 STARTS = 32
-"""Most directions of the half ball that lines of one order are fitted from, the best first: twice the 15 half turns of an
-icosahedron, which has the most axes of one order. Without a limit, a nearly round surface has 500.
+"""Greatest number of half-sphere directions, best first, from which lines of one order are fitted. It is twice the 15 half
+turns of an icosahedron, which has the most axes of one order. Without a limit, a nearly round surface has 500.
 """
 
 
@@ -80,7 +82,7 @@ def find(surface: Surface) -> Symmetries:
     """Return every symmetry of a surface (within `TOLERANCE`), in object axes and metres.
 
     A ball has the three axes of the object as continuous axes. Any other round surface has one axis, and one half turn if its
-    ends are alike. Every other surface has its rotations, by axes: the largest group that holds all its products.
+    ends are alike. For every other surface, the result is the largest group of rotations that contains all their products.
     """
     usual, lines = usual_axes(surface), list[Line]()
     round_ones = list(lines_around(surface, usual, [GOLDEN * i for i in (1, 2, 3)], lines, _as_round))
@@ -91,15 +93,15 @@ def find(surface: Surface) -> Symmetries:
             if not line.order:
                 return _turned(surface, [line])
             lines.append(line)
-            if order == line.order == 2 and _is_prism(lines):  # whose others follow
+            if order == line.order == 2 and _is_prism(lines):  # whose other symmetries follow
                 return _finite(surface, _whole(lines))
-            if sum(one.order > 5 for one in lines) > 1:  # of no finite group: round, but for noise near the tolerance
+            if sum(one.order > 5 for one in lines) > 1:  # not a finite group: round, except for noise near the tolerance
                 return _finite(surface, lines)
     return _finite(surface, _whole(lines))
 
 
 def _finite(surface: Surface, lines: Sequence[Line]) -> Symmetries:
-    """The largest group of rotations about lines of these orders: of all, or of those that fit best."""
+    """The largest group of rotations about these lines with their orders: about all lines, or about those that fit best."""
     best = np.zeros((0, 4, 4))
     for motions in _fittest(surface, lines):
         if len(motions) > len(best):
@@ -121,7 +123,7 @@ def _group(surface: Surface, motions: Float) -> Float:
 
 
 def _fittest(surface: Surface, lines: Sequence[Line]) -> Iterator[Float]:
-    """The turns about all lines; where these are too many, those about the best lines, as many as a solid has."""
+    """Yield the turns about all lines; if there are too many, the turns about the best lines, as many as a solid has."""
     if sum(line.order - 1 for line in lines) <= SOLIDS[0]:
         yield np.array([*_turns(lines)]).reshape(-1, 4, 4)
         return
@@ -146,19 +148,19 @@ def lacking(surface: Surface, declared: Symmetries) -> Iterator[str]:
 
 
 def _off(surface: Surface, motion: Float) -> float:
-    """About how far a motion takes a point of the surface away from all others."""
+    """The approximate greatest distance from the surface to which a motion moves a point of the surface."""
     points = surface.points[:: max(len(surface.points) // 1000, 1)]
     return max(math.sqrt(((points - moved) ** 2).sum(axis=1).min()) for moved in transform(motion, points))
 
 
 def _is_prism(lines: Sequence[Line]) -> bool:
-    """True if the last line lies across the only line of an order above 2."""
+    """True if the last line is perpendicular to the only line of an order above 2."""
     along = [line.axis for line in lines if line.order > 2]
     return len(along) == 1 and abs(float((along[0] * lines[-1].axis).sum())) < math.sin(APART)
 
 
 def _whole(lines: Sequence[Line]) -> Sequence[Line]:
-    """The lines; of a prism, those that follow from the one along it and one across."""
+    """The lines; for a prism, the complete set that follows from the line along it and one across."""
     along = max(lines, key=lambda one: one.order, default=None)
     across = [one for one in lines if one is not along]
     if along is None or along.order == 2 or any(one.order > 2 for one in across):
@@ -195,18 +197,18 @@ def _turns(lines: Iterable[Line]) -> Iterator[Float]:
 
 
 def _plain_motion(surface: Surface, motion: Float) -> Matrix4:
-    """A motion's rows, in numbers that are equal on all processors."""
+    """A motion's rows, rounded to be equal on all processors."""
     places = _metres(surface, motion[:3, 3])
     return cast("Matrix4", (*((*_plain(motion[k, :3]), places[k]) for k in range(3)), (0.0, 0.0, 0.0, 1.0)))
 
 
 def _plain(numbers: ArrayLike, digits: int = 9) -> Vector:
-    """Numbers that are equal on all processors, without a minus before zero."""
+    """Numbers rounded to be equal on all processors, without negative zeros."""
     return cast("Vector", tuple((np.asarray(numbers, np.float64).round(digits) + 0.0).tolist()))
 
 
 def _metres(surface: Surface, numbers: ArrayLike) -> Vector:
-    """Lengths to a millionth of the diameter, or finer."""
+    """Lengths rounded to a millionth of the diameter, or finer."""
     return _plain(numbers, 6 - math.floor(math.log10(surface.diameter)))
 
 
@@ -220,8 +222,8 @@ def _as_round(surface: Surface, line: Line) -> Line | None:
 
 
 def _as_it_is(surface: Surface, line: Line) -> Line | None:
-    """The line with its order, None if it has none: the largest that fits as well as any. Of many sides, numbers near to theirs
-    are within the tolerance.
+    """The line with its order, or None if it has none: the largest order that fits as well as any other. For many sides,
+    neighbouring orders are within the tolerance, too.
     """
     limit = TOLERANCE * surface.diameter
     off = {n: misfit(surface, line, 2 * math.pi / n) for n in ORDERS if is_symmetry(surface, line, [2 * math.pi / n])}
@@ -231,10 +233,10 @@ def _as_it_is(surface: Surface, line: Line) -> Line | None:
 
 
 def _candidates(surface: Surface, usual: Float) -> Iterator[tuple[int, Float]]:
-    """Orders, and axes (N, 3) of which some is near to each axis of that order.
+    """Yield orders and candidate axes (N, 3), at least one of which is near each axis of that order.
 
-    A symmetry leaves the moments of the surface as they are. So its axis is one of theirs; where two are alike it may also be
-    anywhere between these, but then of a half turn; where all are, anywhere.
+    A symmetry leaves the moments of the surface unchanged. So its axis is a principal axis. If two moments are equal, half
+    turns may also have any axis between theirs. If all are equal, any axis is possible.
     """
     values, vectors = np.linalg.eigh(surface.spread)
     low, high = np.diff(values) <= ALIKE * values[2]
@@ -250,14 +252,16 @@ def _candidates(surface: Surface, usual: Float) -> Iterator[tuple[int, Float]]:
 
 
 def _half_ball() -> Float:
-    """Directions (N, 3) spread evenly over half a ball, in a spiral."""
+    """Directions (N, 3) spread evenly over a half sphere, in a spiral."""
     z = (np.arange(AXES) + 0.5) / AXES
     angle, level = GOLDEN * np.arange(AXES), np.sqrt(1 - z * z)
     return np.stack([level * np.cos(angle), level * np.sin(angle), z], axis=1)
 
 
 def _best(surface: Surface, field: DistanceField, axes: Float, order: int) -> Float:
-    """The axes (N, 3), at most `STARTS`, around which turns of an order fit best, the best first; none near to a better one."""
+    """The axes (N, 3), at most `STARTS`, around which turns of an order fit best, the best first, none of them near a better
+    one.
+    """
     misfits = field.misfits(turns_around(axes, surface.center, 2 * math.pi / order), surface.points[:RANKED])
     left = axes[np.argsort(misfits, kind="stable")[: np.isfinite(misfits).sum()]]
     best = list[Float]()

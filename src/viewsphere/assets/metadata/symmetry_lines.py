@@ -1,4 +1,4 @@
-"""Lines around which turns are symmetries of a surface, fitted to it."""
+"""Symmetry axes of a surface as lines in space, fitted to the surface."""
 
 from __future__ import annotations
 
@@ -15,33 +15,33 @@ from viewsphere.geometry.rotation import product, transform
 Float = NDArray[np.float64]
 
 TOLERANCE = 0.01
-"""Share of the diameter by which a symmetry may move a point of the surface away from the surface."""
+"""Greatest distance, as a share of the diameter, by which a symmetry may move a surface point off the surface."""
 
 COARSE = 3.0
-"""Tolerances by which turns around lines may be off that are only near to the one sought."""
+"""Allowed deviation, in tolerances, of turns around lines that are only near the true one."""
 
 APART = 0.09
-"""Radians by which an axis is at most off another that stands for it."""
+"""Greatest angle, in radians, between an axis and a candidate that represents it."""
 
 FIT = 0.1
-"""Tolerances by which orders of an axis may fit worse than the best."""
+"""Allowed excess, in tolerances, of an order's misfit over the best order's."""
 
 NICE = 1e-3
-"""Radians by which an axis may be off one of the object's own, which then takes its place."""
+"""Greatest angle, in radians, at which an axis is replaced by one of the object's own axes."""
 
 FEW = 600
-"""Points that lines are fitted to."""
+"""Number of points that lines are fitted to."""
 
 EARLY, HOPELESS = 3, 2.0
-"""A fit ends after so many steps if its line is still off by more than so many tolerances: three steps take the line of a
-symmetry from 0.09 radians to well within one.
+"""A fit stops after `EARLY` steps if its misfit still exceeds `HOPELESS` tolerances. Three steps bring the line of a symmetry
+from 0.09 radians to well within one tolerance.
 """
 
 
 @dataclass(frozen=True, eq=False)
 class Line:
-    """A line along `axis` (3,), of length 1, through `offset` (3,), metres; and how often a turn around it is repeated until
-    all is as it was: 0 if every turn leaves it so.
+    """A line along `axis` (3,), of length 1, through `offset` (3,), metres; and its order: the number of equal turns that make
+    a full turn, 0 if every turn is a symmetry.
     """
 
     axis: Float
@@ -56,8 +56,8 @@ def lines_around(
     known: Sequence[Line],
     proved: Callable[[Surface, Line], Line | None],
 ) -> Iterator[Line]:
-    """The lines around which turns by these angles are symmetries, near to candidates (N, 3) for their axes, as `proved` has
-    them; but for those near to known ones.
+    """The lines around which turns by these angles are symmetries, near the candidate axes (N, 3), in the form that `proved`
+    returns, except lines near known ones.
     """
     limit, left, found = COARSE * TOLERANCE * surface.diameter, candidates, [line.axis for line in known]
     for axis in found:
@@ -80,7 +80,7 @@ def are_near(axes: Float, axis: Float) -> NDArray[np.bool_]:
 
 
 def _fitting(surface: Surface, line: Line, angles: Sequence[float]) -> Line:
-    """The line near to this one that fits best; itself, if it is one of the surface's moments and hardly fits worse."""
+    """The best-fitting line near this one; the line itself if it is a principal axis of the surface and hardly fits worse."""
     settled, limit = _settled(surface, line, angles), TOLERANCE * surface.diameter
     if not (np.abs(usual_axes(surface) - line.axis).max(axis=1) == 0).any():
         return settled
@@ -89,7 +89,7 @@ def _fitting(surface: Surface, line: Line, angles: Sequence[float]) -> Line:
 
 
 def _settled(surface: Surface, line: Line, angles: Sequence[float]) -> Line:
-    """The line near to this one around which turns take points best to planes of the surface: Gauss-Newton's method.
+    """The line near this one whose turns move points best onto tangent planes of the surface, by the Gauss-Newton method.
 
     Its offset is the point nearest to the surface's centroid.
     """
@@ -114,8 +114,8 @@ def _settled(surface: Surface, line: Line, angles: Sequence[float]) -> Line:
 
 
 def _slopes(surface: Surface, line: Line, angle: float, points: Float, limit: float) -> tuple[Float, Float]:
-    """The derivatives (4, N) of turned points' distances from the surface by the line's tilt and shift, and these distances
-    (N,); both are 0 beyond the limit.
+    """The derivatives (4, N) of the turned points' distances from the surface with respect to the line's tilt and shift, and
+    these distances (N,); both are 0 beyond the limit.
     """
     motion, step = turn_around(line, angle), 1e-6
     squares, there, normals = surface.closest(points, motion, limit)
@@ -128,20 +128,20 @@ def _slopes(surface: Surface, line: Line, angle: float, points: Float, limit: fl
 
 
 def misfit(surface: Surface, line: Line, angle: float) -> float:
-    """The root mean square of distances of points, turned, from the surface, metres, each counted up to the tolerance."""
+    """The root mean square distance of turned points from the surface, metres, each clipped to the tolerance."""
     limit = TOLERANCE * surface.diameter
     squares = surface.closest(surface.points[:FEW], turn_around(line, angle), limit)[0]
     return math.sqrt(float(np.minimum(squares, limit * limit).mean()))
 
 
 def is_symmetry(surface: Surface, line: Line, angles: Iterable[float], tolerances: float = 1.0) -> bool:
-    """True if all turns by these angles, and back, are symmetries within so many tolerances."""
+    """True if all turns by these angles, in both directions, are symmetries within this many tolerances."""
     limit = tolerances * TOLERANCE * surface.diameter
     return all(surface.are_near([turn_around(line, angle), turn_around(line, -angle)], limit).all() for angle in angles)
 
 
 def usual_axes(surface: Surface) -> Float:
-    """The object's own axes, and those of the surface's moments, (6, 3)."""
+    """The object's own axes and the principal axes of the surface, (6, 3)."""
     return np.array([*np.eye(3), *map(nice_axis, np.linalg.eigh(surface.spread)[1].T)])
 
 
@@ -161,14 +161,14 @@ def turns_around(axes: Float, offset: Float, angle: float) -> Float:
 
 
 def _across(axis: Float) -> tuple[Float, Float]:
-    """Two directions at right angles to an axis, and to one another."""
+    """Two directions perpendicular to an axis and to each other."""
     own = np.eye(3)[np.abs(axis).argmin()]
     first = _unit(own - axis * float((own * axis).sum()))
     return first, np.cross(axis, first)
 
 
 def nice_axis(axis: Float) -> Float:
-    """The axis with its longest side positive; or that of the object that it hardly differs from."""
+    """The axis with its largest component positive, or the object's axis if they hardly differ."""
     axis = _unit(axis)
     longest = np.abs(axis).argmax()
     own = np.eye(3)[longest]

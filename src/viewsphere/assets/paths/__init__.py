@@ -1,1 +1,1 @@
-"""The files of a model: its folder, its textures, the parts that a path names, and files with misleading names."""
+"""The files of a model: its folder, its textures, parts named by a path, and files with misleading names."""

@@ -1,9 +1,9 @@
-"""Messages for a process that read a model and ended without an answer."""
+"""Error messages for reader processes that ended without an answer."""
 
 from __future__ import annotations
 
 FROM_OUTSIDE = ("SIGKILL", "SIGTERM", "SIGINT", "SIGHUP", "SIGQUIT")
-"""Signals that come from other processes or the system: no damaged file makes a reader end by one of them."""
+"""Signals that come from other processes or the system: a damaged file never makes a reader end by one of them."""
 
 
 def too_slow(seconds: float) -> str:

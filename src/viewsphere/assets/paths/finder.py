@@ -1,4 +1,4 @@
-"""The file that a model means by a name: the one search for textures, buffers and material libraries of every reader."""
+"""The file search of all readers, for textures, buffers and material libraries that a model names."""
 
 from __future__ import annotations
 
@@ -19,24 +19,24 @@ LAYOUTS = ("materials/textures", "materials", "images", "texture", "textures")
 """
 
 BELOW = ("textures", "texture", "images", "maps", "tex", "materials/textures")
-"""Folders below the model's own that are searched for a file whose own path leads nowhere."""
+"""Folders below the model's own that are searched for a file whose given path does not exist."""
 
 PICTURES = {".bmp", ".dds", ".gif", ".jpeg", ".jpg", ".png", ".ppm", ".tga", ".tif", ".tiff", ".webp"}
 
 NEAREST_AMONG = 2_000
-"""Most files that are compared with the name of a missing one: enough for any asset, and quick in a folder of a million."""
+"""Greatest number of files compared with the name of a missing one: enough for any asset, and fast in a folder of a million."""
 
 URL = re.compile(r"(?i)([a-z][a-z0-9+.-]+)://")
 DRIVE = re.compile(r"/?[A-Za-z][:|](?=/|$)")
 
 
 class NotFoundError(Exception):
-    """No file for a reference; the message says why, and names the nearest file that exists."""
+    """Raised if there is no file for a reference; the message gives the reason and the most similar existing file."""
 
 
 @dataclass(frozen=True)
 class Found:
-    """A file, and whether the reference's own path led elsewhere."""
+    """A file, and whether it differs from the reference's own path."""
 
     path: Path
     elsewhere: bool = False
@@ -46,9 +46,9 @@ class Found:
 class Finder:
     """The search for files that a model names.
 
-    The asset's root is the model's folder; the `LAYOUTS` beside that folder belong to it too. While `confined`, no file
-    outside the root is given or listed, whatever links and `..` a path holds. `looked_for` are all paths that were tried: a
-    model's meaning changes when one of them appears.
+    The asset's root is the model's folder; the `LAYOUTS` beside that folder belong to it, too. While `confined`, no file
+    outside the root is returned or listed, regardless of links and `..` in a path. `looked_for` are all paths that were tried:
+    the model changes if one of them appears.
     """
 
     model: Path
@@ -61,8 +61,8 @@ class Finder:
     def find(self, reference: str, base: Path | None = None) -> Found:
         """The file of a reference, which may be percent-encoded, in another case, or written with backslashes.
 
-        Its path is followed from the model's folder, then from `base`, the folder of the file that holds the reference. A
-        path that leads nowhere counts by its last name: beside the model, beside `base`, then in the known folders. Raises
+        Its path is resolved from the model's folder, then from `base`, the folder of the file that holds the reference. If the
+        path does not exist, its last name is searched beside the model, beside `base`, then in the known folders. Raises
         NotFoundError.
         """
         names = self._names(reference)
@@ -93,7 +93,7 @@ class Finder:
         return None
 
     def _folders(self, base: Path | None) -> list[Path]:
-        """Folders in which a file counts by its last name alone."""
+        """Folders in which a file is searched by its last name alone."""
         starts = [self.model.parent] if base in (None, self.model.parent) else [self.model.parent, base]
         below = [start / name for start in starts for name in BELOW]
         return [*starts, *below, *(self._root.parent / name for name in LAYOUTS)]
@@ -103,7 +103,7 @@ class Finder:
         return _real(self.model.parent)
 
     def _names(self, reference: str) -> list[str]:
-        """The reference as it is and percent-decoded, with slashes; a file: URL is a path."""
+        """The reference both unchanged and percent-decoded, with forward slashes; a file: URL becomes a path."""
         url = URL.match(reference)
         if "\0" in reference or (url and url[1].lower() != "file"):
             raise NotFoundError("is not a path below the model's folder; it is not fetched")
@@ -112,7 +112,7 @@ class Finder:
         return [name for name in dict.fromkeys((name, unquote(name))) if "\0" not in name]
 
     def is_inside(self, path: Path) -> bool:
-        """Return whether a path, its links followed, lies in the asset's root."""
+        """Return whether a path, after resolving links, is in the asset's root."""
         real, folder = _real(path), self._root
         if real.is_relative_to(folder):
             return True
@@ -120,7 +120,7 @@ class Finder:
         return any(PurePosixPath(*map(_key, beside.parts)).is_relative_to(layout) for layout in LAYOUTS)
 
     def _followed(self, folder: Path, name: str) -> Path | None:
-        """The file at a relative path, each of whose names may differ in case; None if it is not there, or outside."""
+        """The file at a relative path, ignoring the case of its names; None if it is missing or outside the root."""
         target = Path(os.path.normpath(_real(folder) / name))
         try:
             if not self._may_give(target):
@@ -151,7 +151,7 @@ class Finder:
         return path
 
     def _listing(self, folder: Path) -> dict[str, str]:
-        """A folder's names by their keys, the first in order of each."""
+        """A folder's names by key; for each key, the first name in order."""
         if folder not in self._listings:
             names = sorted((file.name for file in folder.iterdir()), reverse=True) if folder.is_dir() else []
             self._listings[folder] = {_key(name): name for name in names}
@@ -165,18 +165,18 @@ class Finder:
         return reason if nearest is None else f"{reason} (nearest file: {nearest!r})"
 
     def _nearest(self, last: str, folders: Iterable[Path]) -> str | None:
-        """The file below these folders whose name resembles this one most, from the model's folder."""
+        """The file below these folders with the most similar name, relative to the model's folder."""
         wanted = PurePosixPath(last.lower())
         kinds = PICTURES if wanted.suffix in PICTURES else {wanted.suffix}
         stems = {file: PurePosixPath(file.name.lower()) for file in self._files_in(tuple(folders))}
         stems = {file: name.stem for file, name in stems.items() if name.suffix in kinds}
-        # 0.6, difflib's own threshold, is where names of one series (wood_1, wood_2) still count and others do not.
+        # difflib's default threshold, 0.6, still accepts names of one series (wood_1, wood_2) and rejects others.
         close = difflib.get_close_matches(wanted.stem, list(stems.values()), 1, 0.6)
         best = [file for file, stem in stems.items() if [stem] == close]
         return os.path.relpath(best[0], self._root).replace(os.sep, "/") if best else None
 
     def _files_in(self, folders: tuple[Path, ...]) -> list[Path]:
-        """Files that may be given, in these folders and the folders in them."""
+        """Files that may be returned, in these folders and their subfolders."""
         if folders not in self._files:
             self._files[folders] = list(islice(self._walked(folders), NEAREST_AMONG))
         return self._files[folders]
@@ -204,5 +204,5 @@ def _key(name: str) -> str:
 
 
 def _real(path: Path) -> Path:
-    """The path without links; unlike `Path.resolve` it has an answer for links that lead in circles."""
+    """The path without links; unlike `Path.resolve`, it also handles circular links."""
     return Path(os.path.realpath(path))

@@ -1,4 +1,4 @@
-"""The only way in which readers open files: none outside of the model's folder unless allowed, and each is recorded."""
+"""The file access of readers: only files in the model's folder unless allowed, and each is recorded."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from viewsphere.files import read_bytes
 from viewsphere.limits import limits
 
 SHARPEST = 4096
-"""Longest side, in texels, that textures are reduced to: five of 8,192 would take a worker more than a gigabyte."""
+"""Longest side, in texels, of textures after reduction: five of 8,192 would need more than a gigabyte per worker."""
 
 IMAGE_FORMATS = ("PNG", "JPEG", "WEBP", "BMP", "GIF", "TIFF", "TGA", "DDS", "PPM")
 
@@ -35,17 +35,17 @@ KTX2 = b"\xabKTX 20\xbb\r\n\x1a\n"
 
 
 class UnreadableError(Exception):
-    """A file named by the model cannot be used; the message says why."""
+    """Raised if a file named by the model cannot be used; the message gives the reason."""
 
 
 @dataclass(eq=False)
 class ModelFolder:
     """The folder of one model file while it is read.
 
-    `inside` is the part of the file that is read (`inside.split_source`), and so is `node`, of a glTF file; `shown` are objects
-    of the file that count though renders do not show them; `clip` and `fps` are the animation that plays, and frames a second,
-    None for those of the file; `files` are all files read or looked for, the model itself first; `warnings` say what had to be
-    left out, each with the model's file name; `images` are the textures decoded so far, in order of first use.
+    `inside` is the part of the file to read (`inside.split_source`); for a glTF file, `node` is. `shown` are objects of the
+    file that are read although renders do not show them. `clip` and `fps` are the animation to play and its frame rate, None
+    for the file's defaults. `files` are all files read or searched, the model itself first. `warnings` report omissions, each
+    with the model's file name. `images` are the textures decoded so far, in order of first use.
     """
 
     model: Path
@@ -64,7 +64,7 @@ class ModelFolder:
     _indices: dict[str, int | None] = field(default_factory=dict[str, "int | None"])
 
     def copy(self) -> ModelFolder:
-        """A copy with the files and warnings so far, but without images; both can go on independently."""
+        """A copy with the files and warnings so far, but without images; both can be used independently."""
         return replace(
             self,
             files={**self.files},
@@ -88,23 +88,23 @@ class ModelFolder:
             self.warnings.append(line)
 
     def leave_out(self, count: int, what: str) -> None:
-        """Count things of a kind (`what`, in the singular) that are not read: `assemble` warns of them, or refuses the model
-        if nothing else is in it.
+        """Count items of a kind (`what`, in the singular) that are not read: `assemble` warns of them, or refuses the model if
+        it contains nothing else.
         """
         self.left_out[what] = self.left_out.get(what, 0) + count
 
     @property
     def left(self) -> str:
-        """The things that are not read, with their numbers; empty without any."""
+        """The kinds of items that are not read, with their counts; empty without any."""
         return ", ".join(f"{count:,} {_counted(count, what)}" for what, count in self.left_out.items())
 
     def nothing_left(self) -> ModelError:
-        """A ModelError for a model without triangles that names what it holds instead."""
+        """A ModelError for a model without triangles, with the kinds of items that it contains instead."""
         held = f"the file holds {self.left}, but no faces" if self.left else "the file holds no faces at all"
         return self.error(f"no triangles found: {held}; export the model as a mesh of faces")
 
     def error(self, message: str, line: int | None = None) -> ModelError:
-        """A ModelError with this message, which begins with the model's path, and with the line where it is about one."""
+        """A ModelError with this message, which begins with the model's path, and with the line number if one is given."""
         return ModelError(f"{self.model}: {message}" if line is None else f"{self.model}:{line}: {message}")
 
     def check(self, limit: str, found: int, what: str) -> None:
@@ -135,8 +135,8 @@ class ModelFolder:
     def read(self, reference: str, what: str = "file", base: Path | None = None) -> bytes:
         """Bytes of a file that the model names, or of a data: URI; `base` is the folder of the file that holds the reference.
 
-        Raises UnreadableError when there is no such file (`finder.Finder` says where it is looked for), or only one outside
-        the asset's root while the folder is confined. A file elsewhere than the reference's own path is read with a warning.
+        Raises UnreadableError if there is no such file (see the search of `finder.Finder`), or only one outside the asset's
+        root while the folder is confined. A file found at another path than the reference's own is read with a warning.
         """
         if reference.startswith("data:"):
             return _data_uri(reference)
@@ -162,7 +162,7 @@ class ModelFolder:
         return found.path
 
     def remember(self, path: Path) -> None:
-        """Count a file among those that the model depends on."""
+        """Record a file as a dependency of the model."""
         self._count(str(path))
         self.files[path] = None
 
@@ -174,7 +174,7 @@ class ModelFolder:
         """Index in `images` of the texture `key` (a path or data: URI, found as by `read`, or any name when `data` holds its
         bytes).
 
-        None, with a warning, when the picture cannot be used: the material then has its factors without the texture.
+        None, with a warning, if the picture cannot be used; the material then has its factors without the texture.
         """
         if key not in self._indices:
             index = None
@@ -214,10 +214,10 @@ class ModelFolder:
 
 
 def decode_image(data: bytes, where: str, *, upright: bool = False) -> NDArray[np.uint8]:
-    """Decode a texture to (H, W, 4) uint8; 16-bit channels keep their upper byte. Of a KTX 2 file, its largest level.
+    """Decode a texture to (H, W, 4) uint8; 16-bit channels keep their upper byte. For a KTX 2 file, the largest level is used.
 
-    With `upright` a photograph is rotated by its EXIF orientation, which does not apply to textures. Raises
-    UnreadableError, beginning with `where`: no image, a damaged one, or one beyond `limits`.
+    With `upright` a photograph is rotated by its EXIF orientation, which does not apply to textures. Raises UnreadableError,
+    beginning with `where`, if the data is not an image, is damaged, or exceeds `limits`.
     """
     from PIL import Image as Pillow
     from PIL import ImageOps, UnidentifiedImageError
@@ -238,13 +238,13 @@ def decode_image(data: bytes, where: str, *, upright: bool = False) -> NDArray[n
         found = "many more"
     except MemoryError:
         raise
-    except Exception as error:  # Pillow's decoders raise whatever their format's parser does
+    except Exception as error:  # Pillow's decoders raise any error of their format's parser
         raise UnreadableError(f"{where} cannot be decoded ({str(error)[:80]})") from None
     raise _too_large(where, found)
 
 
 def _ktx2_pixels(data: bytes, where: str) -> NDArray[np.uint8]:
-    """Pixels of a KTX 2 file that Basis Universal has compressed, by the package opengl_basisu."""
+    """Pixels of a KTX 2 file compressed by Basis Universal, decoded by the package opengl_basisu."""
     from importlib import import_module
 
     try:
@@ -282,7 +282,7 @@ def image_pixels(picture: Any) -> NDArray[np.uint8]:
 def reduced(pixels: NDArray[np.uint8], sharpest: int) -> NDArray[np.uint8]:
     """The picture (H, W, 4) reduced by the whole factor that leaves neither side longer than `sharpest`.
 
-    Colours are averaged by their alpha.
+    Colours are averaged with their alpha as weight.
     """
     from PIL import Image as Pillow
 
@@ -291,7 +291,7 @@ def reduced(pixels: NDArray[np.uint8], sharpest: int) -> NDArray[np.uint8]:
 
 
 def _counted(count: int, what: str) -> str:
-    """A noun's plural, whose first word ends in s, for any count but 1: `faces of fewer than three corners`."""
+    """The count with its noun; except for 1, the first word gets an s: `faces of fewer than three corners`."""
     noun, of, rest = what.partition(" of ")
     return what if count == 1 else f"{'vertice' if noun == 'vertex' else noun}s{of}{rest}"
 

@@ -1,4 +1,4 @@
-"""Files that are no model at all, or one of another kind, known by their first bytes: pointers, web pages, archives."""
+"""Detection of files that are not a model or have another format, by their first bytes: pointers, web pages, archives."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ from viewsphere.assets.paths.finder import PICTURES as PICTURE_ENDINGS
 from viewsphere.assets.readers import readers
 
 HEAD = 4096
-"""Bytes that are looked at: a server's message or the head of a page fits."""
+"""Number of leading bytes examined, enough for a server's message or the start of a page."""
 
 PAGE = re.compile(rb"(?is)\s*(?:<!--.*?-->\s*)*<(?:!doctype html|html|head|body|script)\b")
 MESSAGE = re.compile(
     rb"(?is)\s*(?:(?:error:? )?[45]\d\d\b|not found\b|access denied\b|forbidden\b|(?:<\?xml[^>]*>\s*)?<error>"
     rb"|\{(?!.*\"asset\")[^{]*\"(?:message|error|detail)\"\s*:)"
 )
-"""Replies of servers in place of a file: an HTTP status, a store's XML, or JSON with a message."""
+"""Replies of servers instead of a file: an HTTP status, a store's XML, or JSON with a message."""
 
 ARCHIVES = {
     b"PK\x03\x04": "ZIP",
@@ -30,13 +30,13 @@ PICTURES = {b"\x89PNG": "PNG", b"\xff\xd8\xff": "JPEG", b"RIFF": "WebP", b"GIF8"
 
 
 def impostor(data: bytes) -> str | None:
-    """The content of a stand-in for a file, and the remedy: a pointer, or a server's page or message; None for neither."""
+    """A description of a stand-in for a file (a pointer, or a server's page or message), and the fix; None for other data."""
     head = data[:HEAD].removeprefix(b"\xef\xbb\xbf")
     return _pointer(head) or _from_server(head, len(data))
 
 
 def wrong_kind(data: bytes, suffix: str) -> str | None:
-    """The content of a file that is no model with this suffix, by its first bytes, and the remedy; None if unknown."""
+    """A description of a file whose first bytes show that it is not a model with this suffix, and the fix; None if unknown."""
     kind = next((name for magic, name in ARCHIVES.items() if data.startswith(magic)), None)
     if kind is not None and all(reader.archives.get(suffix) != kind for reader in readers().values()):
         return f"a {kind} archive; unpack it and name the file in it"

@@ -16,7 +16,7 @@ def split_source(path: Path) -> tuple[Path, tuple[str, ...]]:
 
     Raises ModelError for a path into a .blend file that names neither an object nor a collection.
     """
-    if BLEND not in str(path).lower():  # almost all paths, and to walk their parents costs more than all else of a plan
+    if BLEND not in str(path).lower():  # true for almost all paths, and walking their parents would dominate the cost of a plan
         return path, ()
     for file in path.parents:
         if file.suffix.lower() == BLEND and not file.is_dir():

@@ -1,4 +1,4 @@
-"""Readers of model files, a package for each; a suffix chooses the reader."""
+"""Readers of model files, one package each, selected by suffix."""
 
 from __future__ import annotations
 
@@ -12,19 +12,19 @@ from viewsphere.plugins.reader import ReaderSpec
 
 
 def readers() -> dict[str, ReaderSpec]:
-    """All readers by name, those of viewsphere first; no third-party reader that cannot be loaded."""
+    """All readers by name, viewsphere's first; third-party readers that cannot be loaded are left out."""
     return _readers(plugins.names("readers"), tuple(plugins.entry_points("viewsphere.readers")))
 
 
 @lru_cache(maxsize=1)
 def _readers(_names: tuple[str, ...], _entries: tuple[metadata.EntryPoint, ...]) -> dict[str, ReaderSpec]:
-    """The readers of these names: looked up for every model, so loaded once, and again after a change of what is installed."""
+    """The readers of these names. They are needed for every model, so they are cached until the installed packages change."""
     found = plugins.loadable(ReaderSpec)
     return dict(sorted(found.items(), key=lambda item: plugins.is_third_party("readers", item[0])))
 
 
 def reader_of(suffix: str, *, moving: bool = False) -> ReaderSpec | None:
-    """The reader of files with this suffix, without its dot, or of their animations; None if there is none."""
+    """The reader of files with this suffix (without its dot), or the reader of their animations; None if there is none."""
     known = [one for one in readers().values() if suffix in one.suffixes and (one.frames is not None or not moving)]
     return min(known, key=lambda one: (not is_installed(one), one.by_blender), default=None)
 
@@ -40,7 +40,7 @@ def missing(reader: ReaderSpec) -> list[str]:
 
 
 def suffixes(*, by_blender: bool | None = None) -> tuple[str, ...]:
-    """Suffixes of model files, pictures left out, sorted: all, or those that Blender reads here (those that it does not)."""
+    """Sorted suffixes of model files, without pictures: all, or only those that Blender reads here, or only the others."""
     known = sorted({suffix for one in readers().values() if not one.is_picture for suffix in one.suffixes})
     if by_blender is None:
         return tuple(known)
@@ -53,7 +53,7 @@ def _is_by_blender(suffix: str) -> bool:
 
 
 def third_party_sources(suffix: str) -> list[Path]:
-    """The files whose change may change the models of a third party's reader; empty for readers of viewsphere."""
+    """The source files that the results of a third-party reader depend on; empty for viewsphere's readers."""
     reader = reader_of(suffix)
     name = next((name for name, one in readers().items() if one is reader), None)
     if name is None or not plugins.is_third_party("readers", name):

@@ -1,1 +1,1 @@
-"""Model files are read in a process of their own, with limits."""
+"""Reading of model files in a separate process with limits."""

@@ -1,4 +1,4 @@
-"""Reading a model file in a process of its own: a crash, an endless loop or a flood of memory costs one message."""
+"""Reading of a model file in a separate process, so that a crash, an endless loop or excessive memory use costs one message."""
 
 from __future__ import annotations
 
@@ -21,15 +21,15 @@ from viewsphere.model.model_spec import ModelSpec
 from viewsphere.scratch import temporary
 
 READ_HERE = "VIEWSPHERE_READ_HERE"
-"""Set to 1, this variable lets models be read in the calling process, unprotected."""
+"""If this variable is 1, models are read in the calling process, without protection."""
 
 
 def read_apart(spec: ModelSpec, frames: Sequence[int], folder: Path) -> tuple[list[Path], list[Path]]:
-    """Read and normalise a model file in a short-lived process that writes only below `folder`: as it is at frames of its
-    animation, which ascend, or for no frames as it stands.
+    """Read and normalise a model file in a short-lived process that writes only below `folder`: at the ascending frames of its
+    animation, or without animation if there are no frames.
 
-    Gives the files that `mesh_file.read_mesh` reads, one a frame, and the files that the model named. Raises ModelError in one
-    line: what the reader says of the file, or how its process came to its end (killed for time or memory, crashed).
+    Returns the files for `mesh_file.read_mesh`, one per frame, and the files that the model named. Raises a one-line
+    ModelError: the reader's message, or the way its process ended (killed for time or memory, crashed).
     """
     memory = limits.MAX_READ_BYTES
     seconds = limits.MAX_READ_SECONDS * (1 + len(frames))
@@ -43,9 +43,7 @@ def read_apart(spec: ModelSpec, frames: Sequence[int], folder: Path) -> tuple[li
 
 
 def timeline_apart(path: Path, confined: bool, clip: str | None, fps: float | None) -> tuple[dict[str, Any], list[Path]]:
-    """The timeline of a file, which its reader reads in a short-lived process, and the files that it names; otherwise as
-    `read_apart`.
-    """
+    """The timeline of a file, read in a short-lived process, and the files that it names; otherwise as `read_apart`."""
     spec = ModelSpec(
         key="timeline", source=str(path), category="model", category_id=1, confined=confined, clip=clip, fps=fps
     )  # fmt: skip
@@ -66,7 +64,7 @@ def timeline_apart(path: Path, confined: bool, clip: str | None, fps: float | No
 
 
 def _run(job: Job) -> dict[str, Any]:
-    """The outcome of a process of its own."""
+    """The outcome of a job in a separate process."""
     folder = Path(job.folder)
     try:
         ended = do(job)

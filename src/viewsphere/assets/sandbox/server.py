@@ -1,4 +1,4 @@
-"""The reader's process: started for the first model file, and kept for the files that follow."""
+"""The reader's process, started for the first model file and reused for later ones."""
 
 from __future__ import annotations
 
@@ -19,7 +19,9 @@ from viewsphere.assets.sandbox.worker import LOG, Job
 SINGLE_THREADED = {
     name: "1" for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "PXR_WORK_THREAD_LIMIT")
 }
-"""Threads reserve address space, which is limited, and readers have no use for them."""
+"""Environment variables that turn off threads: threads reserve address space, which is limited, and readers do not need
+them.
+"""
 
 
 @dataclass(frozen=True)
@@ -50,14 +52,14 @@ class Setting:
 
 @dataclass(frozen=True, eq=False)
 class ReaderProcess:
-    """A reader that runs, and what it inherited."""
+    """A running reader process and the settings that it inherited."""
 
     process: subprocess.Popen[bytes]
     setting: Setting
 
     @classmethod
     def start(cls, setting: Setting, log: Path) -> ReaderProcess:
-        """A new one, which prints to a log; raises OSError or ValueError where none can be started."""
+        """A new reader, which prints to a log; raises OSError or ValueError if none can be started."""
         command = [setting.executable, "-P", "-m", "viewsphere.assets.sandbox.worker"]
         pipe = subprocess.PIPE
         with log.open("wb") as file:
@@ -74,7 +76,9 @@ class ReaderProcess:
             )
 
     def answer(self, job: Job) -> tuple[Ended, bool]:
-        """Return the end of a job, and whether the reader waits for another. A reader that ended gives its own exit code."""
+        """Return the end of a job, and whether the reader waits for another. If the reader itself ended, the result is its exit
+        code.
+        """
         assert self.process.stdin is not None and self.process.stdout is not None
         late = Event()
         timer = Timer(job.seconds, lambda: (late.set(), self.kill()))
@@ -95,13 +99,13 @@ class ReaderProcess:
             timer.cancel()
 
     def kill(self) -> None:
-        """End it and all that it forked, at once."""
+        """Kill the reader and all processes that it forked."""
         if self.process.poll() is None:
-            with suppress(ProcessLookupError, PermissionError):  # it ends at this moment
+            with suppress(ProcessLookupError, PermissionError):  # it is just ending
                 self.process.kill() if sys.platform == "win32" else os.killpg(self.process.pid, signal.SIGKILL)
 
     def close(self) -> None:
-        """End it, and leave nothing open."""
+        """End the reader, and close its files."""
         self.kill()
         self.process.wait()
         for pipe in (self.process.stdin, self.process.stdout):
@@ -111,7 +115,7 @@ class ReaderProcess:
 
 
 def do(job: Job) -> Ended:
-    """Do a job in a process of its own; raises OSError or ValueError where none can be started."""
+    """Do a job in a separate process; raises OSError or ValueError if none can be started."""
     idle, setting = _idle_readers(os.getpid()), Setting.current()
     for reader, is_new in _readers(idle, setting, Path(job.folder) / LOG):
         ended, waits = reader.answer(job)
@@ -125,7 +129,9 @@ def do(job: Job) -> Ended:
 
 
 def _readers(idle: list[ReaderProcess], setting: Setting, log: Path) -> Iterator[tuple[ReaderProcess, bool]]:
-    """Idle readers of a setting, which may have ended since their last job, then a new one; those of others are closed."""
+    """Yield idle readers with this setting, which may have ended since their last job, then a new one. Readers with other
+    settings are closed.
+    """
     with suppress(IndexError):
         while True:
             reader = idle.pop()
@@ -138,7 +144,7 @@ def _readers(idle: list[ReaderProcess], setting: Setting, log: Path) -> Iterator
 
 @cache
 def _idle_readers(process_id: int) -> list[ReaderProcess]:
-    """The readers of this process that wait for a job; a process that is forked from it has none."""
+    """The idle readers of this process; a process forked from it has none."""
     readers: list[ReaderProcess] = []
     atexit.register(_close_all, readers, process_id)
     return readers

@@ -2,9 +2,9 @@
 
 A line of standard input is a job: the model's specification, the folder for the result, and the limits. The folder receives
 `mesh.arrays` and `outcome.json`: the files that the model named, or the error. On Linux a process is forked for each job, and a
-line of standard output is its exit code. The program itself opens no model, so that nothing of one file is left for the next.
-Other systems do not fork safely: there the program ends with its first job. End of file on standard input means that the
-process that asked is gone.
+line of standard output is its exit code. The program itself opens no model, so that one file cannot affect the next. Other
+systems do not fork safely, so there the program ends after its first job. End of file on standard input means that the
+requesting process is gone.
 """
 
 from __future__ import annotations
@@ -32,10 +32,10 @@ if TYPE_CHECKING:
 MESH, OUTCOME, LOG = "mesh.arrays", "outcome.json", "log.txt"
 
 FORKS = sys.platform == "linux"
-"""True where the program reads many files, each in a process forked from it."""
+"""True if the program reads many files, each in a process forked from it."""
 
 IDLE_SECONDS = 30.0
-"""The program ends after so long without a job: it holds 50 MB, and starts again in 0.3 s of processor time."""
+"""Seconds without a job after which the program ends: it holds 50 MB, and restarts in 0.3 s of processor time."""
 
 IMPORTED = (
     "ctypes",
@@ -46,16 +46,16 @@ IMPORTED = (
     "viewsphere.assets.mesh_file",
     "viewsphere.assets.normalise",
 )
-"""Modules that are imported before the first fork, with those of the readers: always the same, so that memory limits leave each
-file equal room.
+"""Modules imported before the first fork, together with the readers' modules. They are always the same, so that memory limits
+leave equal room for each file.
 """
 
 
 @dataclass(frozen=True)
 class Job:
     """A model to read (a ModelSpec's fields), the folder for the result, limits of seconds and bytes, and whether its reader
-    reserves more memory than it writes to. `frames` of its animation, which ascend, are read; none: the file as it stands.
-    With `is_timeline`, only the timeline of the file is read.
+    reserves more memory than it writes to. The ascending `frames` of its animation are read; without any, the file is read
+    without animation. With `is_timeline`, only the timeline of the file is read.
     """
 
     spec: dict[str, Any]
@@ -79,7 +79,7 @@ class Job:
 
 def main() -> None:
     """Do the jobs of standard input."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the process that asked decides
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the requesting process decides
     if FORKS:
         _serve()
     else:
@@ -92,7 +92,7 @@ def main() -> None:
 def _serve() -> None:
     """Fork a process for each job, until no job comes."""
     answers = os.dup(1)
-    os.dup2(2, 1)  # whatever modules print is no answer
+    os.dup2(2, 1)  # output of modules must not be mistaken for an answer
     for name in IMPORTED:
         import_module(name)
     _import_readers()
@@ -117,7 +117,7 @@ def _serve() -> None:
 
 
 def _import_readers() -> None:
-    """Import the modules of all readers; one that cannot be imported is an error of the files that need it."""
+    """Import the modules of all readers; a failed import becomes an error of the files that need the module."""
     from viewsphere.assets.readers import readers
 
     for name in chain.from_iterable(reader.modules for reader in readers().values()):
@@ -126,7 +126,7 @@ def _import_readers() -> None:
 
 
 def _noted(number: int, frame: object) -> None:
-    """Leave it to the wakeup pipe, which receives nothing of signals that have no handler."""
+    """A signal handler that does nothing: the wakeup pipe only receives signals that have a handler."""
 
 
 def _lines(file: int) -> Iterator[bytes]:
@@ -142,12 +142,13 @@ def _is_ready(*files: int) -> list[int]:
 
 
 def _exit_code(child: int, ended: int) -> int:
-    """The exit code of a forked process, minus the signal for one that was killed. Both processes end if the asking one does.
+    """The exit code of a forked process, or minus the signal if it was killed. Both processes end if the requesting process
+    ends.
 
     `ended`: a pipe that receives a byte when a process has ended.
     """
     while True:
-        if 0 in _is_ready(0, ended):  # no further job comes before the answer: this is the end of the file
+        if 0 in _is_ready(0, ended):  # no further job arrives before the answer, so this is the end of the file
             os.kill(child, signal.SIGKILL)
             os._exit(1)
         done, status = os.waitpid(child, os.WNOHANG)
@@ -158,13 +159,13 @@ def _exit_code(child: int, ended: int) -> int:
 
 
 def _redirect(log: Path, close: Sequence[int]) -> None:
-    """Leave a forked process no file of the program's: nothing on standard input, and a log for all that it prints."""
+    """Replace a forked process's files: empty standard input, a log for all output, and none of the program's other files."""
     out, nothing = os.open(log, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o600), os.open(os.devnull, os.O_RDONLY)
     for new, old in ((nothing, 0), (out, 1), (out, 2)):
         os.dup2(new, old)
     for file in (out, nothing, *close):
         os.close(file)
-    os.environ.update(dict.fromkeys(("TMPDIR", "TEMP", "TMP"), str(log.parent)))  # gone with it
+    os.environ.update(dict.fromkeys(("TMPDIR", "TEMP", "TMP"), str(log.parent)))  # removed with the job's folder
 
 
 def _do(job: Job) -> None:
@@ -223,7 +224,7 @@ def _read_model(spec: ModelSpec, job: Job) -> Sequence[Path]:
 
 
 def _read_timeline(spec: ModelSpec) -> dict[str, Any]:
-    """The timeline of a file, and the files that it names."""
+    """The timeline of a file and the files that it names."""
     from viewsphere.assets.load import suffix_of
     from viewsphere.assets.paths.folder import ModelFolder
     from viewsphere.assets.readers import reader_of
@@ -240,7 +241,7 @@ def mesh_name(number: int) -> str:
 
 
 def _end_with(parent: int) -> None:
-    """End this process when the one that forked it ends."""
+    """End this process when its parent ends."""
     import ctypes
 
     set_death_signal = 1  # PR_SET_PDEATHSIG, prctl(2)
@@ -268,7 +269,7 @@ def _limit(job: Job) -> None:
     seconds = int(2 * job.seconds * cores) + 1
     wanted = {memory: job.memory, "RLIMIT_FSIZE": job.memory, "RLIMIT_CPU": seconds, "RLIMIT_CORE": 0}
     for name, most in wanted.items():
-        with suppress(ValueError, OSError, AttributeError):  # a limit that the platform lacks, or has set lower
+        with suppress(ValueError, OSError, AttributeError):  # a limit that the platform lacks or has set lower
             kind = getattr(resource, name)
             hard = resource.getrlimit(kind)[1]
             resource.setrlimit(kind, (most if hard == resource.RLIM_INFINITY else min(most, hard), hard))

@@ -9,26 +9,26 @@ from isal import isal_zlib
 from numpy.typing import NDArray
 
 ZLIB, RAW = 15, -15
-"""Windows of 32 kB, with zlib's head and checksum or without."""
+"""Windows of 32 kB, with or without zlib's header and checksum."""
 
 LEVEL = 1
-"""ISA-L's: ten times as fast as zlib's usual level, its output hardly larger."""
+"""ISA-L's compression level: ten times as fast as zlib's usual level, with hardly larger output."""
 
 HEAD = 8
-"""Bytes at the start that become a block of their own: between 4 and 16, see `compressed`."""
+"""Number of leading bytes that become a separate block, between 4 and 16; see `compressed`."""
 
 
 def compressed(array: NDArray[Any], window: int = ZLIB) -> bytes:
-    """The deflated bytes of an array as they lie in C order, a function of those bytes alone.
+    """The deflated bytes of an array in C order; the result depends on those bytes alone.
 
-    `isal_zlib.compress` is none. Where ISA-L's loop for x86 begins without a history (`.write_first_byte` of
-    igzip_icf_body_h1_gr_bt.asm, levels 1 and 2), it hashes what a register happens to hold, the address of its own state, in
-    place of the bytes from the third on. Once in 8,192 addresses (of short inputs, hundreds) that is the hash of bytes that the
-    input has, and a later match is another. So the loop is given a history: the first HEAD bytes, which are too few for
-    it and are left to the loop for the last bytes, are a block of their own. This costs 20 to 40 bytes and 0.03 ms.
+    The result of `isal_zlib.compress` does not. If ISA-L's loop for x86 begins without a history (`.write_first_byte` of
+    igzip_icf_body_h1_gr_bt.asm, levels 1 and 2), it hashes the leftover content of a register, the address of its own state,
+    instead of the bytes from the third on. For one in 8,192 addresses (for short inputs, one in hundreds), this equals the hash
+    of bytes in the input and changes a later match. To give the loop a history, the first HEAD bytes become a separate block.
+    They are too few for that loop, so the loop for the last bytes encodes them. This costs 20 to 40 bytes and 0.03 ms.
 
     All of ISA-L's code for x86 from SSE 4.2 on makes the same bytes. Its code for ARM, and for older processors, finds other
-    matches: there, equal pixels make equal bytes too, but not those of a newer x86.
+    matches: equal pixels make equal bytes there too, but other bytes than on a newer x86.
     """
     data = np.ascontiguousarray(array).reshape(-1).view(np.uint8)
     deflator = isal_zlib.compressobj(LEVEL, isal_zlib.DEFLATED, window)
@@ -37,9 +37,10 @@ def compressed(array: NDArray[Any], window: int = ZLIB) -> bytes:
 
 
 def deflate(array: NDArray[Any]) -> bytes | memoryview:
-    """The raw deflate stream of an array's bytes, as they lie in C order.
+    """The raw deflate stream of an array's bytes in C order.
 
-    Of float32 pixels (H, W) or (H, W, 3) only runs of equal pixels are coded, since nothing else pays: see `kernels_deflate`.
+    For float32 pixels (H, W) or (H, W, 3), only runs of equal pixels are coded, since other matches cost more than they save;
+    see `kernels_deflate`.
     """
     step = 1 if array.ndim == 2 else array.shape[-1]
     array = np.ascontiguousarray(array)
@@ -56,8 +57,8 @@ def deflate(array: NDArray[Any]) -> bytes | memoryview:
 def deflate_lines(lines: NDArray[np.uint8], step: int) -> bytes:
     """The raw deflate stream of a rendered picture's filtered scan lines, of pixels of 3 or 4 bytes.
 
-    Twice as fast as `compressed`, and of the same size for what is rendered: see `kernels_huffman`. Lines that it would make
-    longer, such as noise, are left to `compressed`.
+    For rendered pictures, twice as fast as `compressed` with output of the same size; see `kernels_huffman`. Lines that this
+    method would enlarge, such as noise, go to `compressed`.
     """
     from viewsphere.codecs.deflate import kernels_huffman as kernels
 

@@ -1,7 +1,7 @@
 """A compiled deflate for pixels of 32-bit numbers: runs of equal pixels are coded, all other bytes are stored as they are.
 
-Rendered numbers are noise where a surface bends and constant elsewhere: searching for anything but runs costs four times as
-much and saves a tenth. The stream is plain deflate (RFC 1951), blocks of type 0 and 1 in turn.
+Rendered numbers are noise on curved surfaces and constant elsewhere. A search for matches other than runs takes four times as
+long and saves a tenth of the bytes. The stream is plain deflate (RFC 1951), blocks of type 0 and 1 in turn.
 """
 
 from __future__ import annotations
@@ -39,9 +39,10 @@ def match_codes(distance: int) -> tuple[np.ndarray, np.ndarray]:
 
 @njit
 def deflate_runs(words, step, codes, widths, data, out, at):
-    """Write the raw deflate stream of `data` (bytes, not empty) into `out` from index `at` on; returns the index after its end.
+    """Write the raw deflate stream of `data` (bytes, not empty) into `out` from index `at`; return the index after its end.
 
-    `words` are the same bytes as 32-bit words, `step` (1 or 3) of which make a pixel; `codes` and `widths` its `match_codes`.
+    `words` are the same bytes as 32-bit words, `step` (1 or 3) of which make a pixel; `codes` and `widths` are from
+    `match_codes`.
     """
     count, second, third = len(words), step // 3, 2 * (step // 3)
     waiting, bits = np.uint64(0), 0
@@ -121,7 +122,7 @@ def _repeats(words, step, j):
 @inner
 def send(out, at, waiting, bits):
     """Write the whole bytes among the waiting bits."""
-    for k in range(U(8)):  # always 8 bytes, most of them overwritten next: loops of one to three bytes mispredict branches
+    for k in range(U(8)):  # always 8 bytes, most are overwritten next: loops of 1 to 3 bytes mispredict branches
         out[U(at) + k] = np.uint8(waiting >> np.uint64(8 * k))
     whole = bits >> 3
     return at + whole, waiting >> np.uint64(8 * whole), bits & 7

@@ -1,4 +1,4 @@
-"""A compiled deflate for filtered scan lines of rendered pictures: Huffman codes, and matches for runs of zeros alone.
+"""A compiled deflate for filtered scan lines of rendered pictures: Huffman codes, with matches only for runs of zeros.
 
 The filter leaves small numbers, and zeros where pixels equal their left neighbours. Any other match would save 2 % of the bytes
 of a rendered picture and double the time. The stream is one block of type 2 (RFC 1951); its codes fit a sample of the lines.
@@ -13,20 +13,20 @@ from viewsphere.kernels.jit import inner, njit
 
 U = np.uintp
 SYMBOLS, END = 286, 256
-SUB = 1  # PNG's number of the filter
-LONGEST_CODE = 14  # bits: codes of four bytes and the bits that wait just fit into 64
+SUB = 1  # the filter's number in PNG
+LONGEST_CODE = 14  # bits: codes of four bytes and the pending bits just fit into 64
 LONGEST = 258  # bytes of a match
-RUN = 3  # pixels of zeros that begin a run: shorter ones are hard to foresee for the processor, and save little
-WEIGHT = 16  # of a symbol that is met: symbols that are not count 1, and have longer codes in small pictures, too
-LINES, PIXELS = 32, 20_000  # at least that codes are made for: files are at most 0.4 % larger than with 120 lines
-LENGTH_BITS = 4  # every code length is sent in so many bits, which costs 80 bytes and spares a second Huffman code
+RUN = 3  # zero pixels that begin a run: shorter runs cause branch mispredictions and save little
+WEIGHT = 16  # weight of a counted symbol: unseen symbols count 1, and get longer codes in small pictures, too
+LINES, PIXELS = 32, 20_000  # least sample that codes are made from: files are at most 0.4 % larger than with 120 lines
+LENGTH_BITS = 4  # bits of every sent code length; costs 80 bytes, avoids a second Huffman code
 ORDER = (16, 17, 18, 0, 8, 7, 9, 6, 10, 5, 11, 4, 12, 3, 13, 2, 14, 1, 15)  # of code lengths: RFC 1951, 3.2.7
 
 
 @njit
 def subtract_left(rows, step, lines):
-    """Fill scan lines (H, 1 + W) uint8 with rows (H, W) uint8 less their bytes `step` before, each after the number of PNG's
-    Sub filter.
+    """Fill scan lines (H, 1 + W) uint8 with rows (H, W) uint8 after PNG's Sub filter, which subtracts the byte `step` places
+    before. Each line starts with the filter's number.
     """
     first, width = U(step), U(rows.shape[1])
     for y in range(U(rows.shape[0])):
@@ -40,8 +40,8 @@ def subtract_left(rows, step, lines):
 
 @njit
 def deflate_lines(lines, step, words, room, out):
-    """Write the raw deflate stream of filtered scan lines (H, 1 + step * W) uint8 into `out`, from its start on; returns the
-    index after its end.
+    """Write the raw deflate stream of filtered scan lines (H, 1 + step * W) uint8 into `out`, from its start; return the index
+    after its end.
 
     step: bytes of a pixel, 3 or 4. words (W + RUN,) uint32, room (4, SYMBOLS) int64: scratch. out holds two bytes for each
     byte of the lines, and 512 more.
@@ -110,7 +110,7 @@ def _run_end(words, x):
 
 @inner
 def _count(lines, step, words, counts):
-    """Fill counts (SYMBOLS,) with how often each symbol stands in some of the lines; every symbol counts once at least."""
+    """Fill counts (SYMBOLS,) with the count of each symbol in a sample of the lines; every count is at least 1."""
     height, width = lines.shape[0], U(words.shape[0] - RUN)
     for k in range(U(SYMBOLS)):
         counts[k] = 1
@@ -138,7 +138,7 @@ def _count(lines, step, words, counts):
 
 @inner
 def _length_symbol(length):
-    """The symbol of a match of a length (3 to 258), its extra bits, and how many these are (RFC 1951, 3.2.5)."""
+    """The symbol of a match of this length (3 to 258), its extra bits, and their number (RFC 1951, 3.2.5)."""
     if length == LONGEST:
         return 285, 0, 0
     past, extra = length - 3, 0
@@ -216,7 +216,7 @@ def _tree_depths(a):
 
 @inner
 def _shorten(depths, amounts):
-    """Fill amounts with how many codes have each length: those of a tree, of which none is longer than LONGEST_CODE."""
+    """Fill amounts with the number of codes of each length in a tree; no code is longer than LONGEST_CODE."""
     for k in range(U(SYMBOLS)):
         amounts[k] = 0
     for k in range(U(SYMBOLS)):
@@ -224,7 +224,7 @@ def _shorten(depths, amounts):
     total = 0
     for length in range(1, LONGEST_CODE + 1):
         total += amounts[U(length)] << (LONGEST_CODE - length)
-    while total > 1 << LONGEST_CODE:  # a leaf takes the place of a shorter one, with which it moves below
+    while total > 1 << LONGEST_CODE:  # a leaf replaces a shorter one, and both move one level down
         amounts[U(LONGEST_CODE)] -= 1
         length = LONGEST_CODE - 1
         while amounts[U(length)] == 0:
@@ -236,7 +236,7 @@ def _shorten(depths, amounts):
 
 @inner
 def _turned(code, length):
-    """The bits of a code, the last one first."""
+    """The bits of a code in reverse order."""
     turned = 0
     for k in range(length):
         turned |= ((code >> k) & 1) << (length - 1 - k)
@@ -245,7 +245,9 @@ def _turned(code, length):
 
 @inner
 def _send_lengths(codes, out, at, waiting, bits):
-    """Send the table of code lengths, of a fixed length each, and that of one distance, which has a code of one bit."""
+    """Send the table of code lengths, each in a fixed number of bits, and the table of the one distance, whose code has one
+    bit.
+    """
     waiting |= np.uint64((SYMBOLS - 257) | 0 << 5 | (len(ORDER) - 4) << 10) << np.uint64(bits)
     at, waiting, bits = send(out, at, waiting, bits + 14)
     for k in range(len(ORDER)):
@@ -260,7 +262,7 @@ def _send_lengths(codes, out, at, waiting, bits):
 
 @inner
 def _append(code, waiting, bits):
-    """Let the bits of a code wait, too."""
+    """Append the bits of a code to the pending bits."""
     return waiting | np.uint64(code >> 8) << np.uint64(bits), bits + (code & 255)
 
 

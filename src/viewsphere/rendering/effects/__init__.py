@@ -1,6 +1,6 @@
 """The effects of a camera on its picture; labels never change.
 
-Effects apply in the order of light's way: lines on the objects, lens, sensor, the camera's computer. Pictures are
+Effects apply in the order of the light path: lines on the objects, lens, sensor, the camera's computer. Pictures are
 display-linear in [0, 1], (H, W, 3), or (H, W, 4) premultiplied, where blurs spread alpha too, while noise and colours leave
 alpha alone. Strength 0 changes no byte; with W the picture's width, strength 1 means:
 
@@ -20,7 +20,8 @@ alpha alone. Strength 0 changes no byte; with W the picture's width, strength 1 
 | `hue` | at 1 or -1 half a turn about grey, luminance kept |
 | `jpeg` | quality 5 (95 just above strength 0), colours at half the resolution; applied last, to bytes |
 
-Between 0 and 1 strengths count in proportion; shot noise's electrons go with 1 / strength^2, so that its noise does so, too.
+Between 0 and 1, effects scale in proportion to strength. Shot noise scales its electrons with 1 / strength^2, so that its noise
+is proportional, too.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Blurs that are the same all over the picture: a Gaussian, and a camera that moves during the exposure."""
+"""Blurs that are uniform across the picture: a Gaussian, and the motion of the camera during the exposure."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ STREAK = 1 / 12
 
 
 def blur(picture: Float32, strength: float) -> Float32:
-    """The picture under a Gaussian: light is blurred, and its sum is kept."""
+    """The picture blurred by a Gaussian, in linear light; the sum of the light is kept."""
     sigma = strength * SIGMA * picture.shape[1]
     return spread_both_ways(picture, gaussian(sigma)) if strength > 0 else picture
 
@@ -30,7 +30,7 @@ def motion_blur(picture: Float32, strength: float, angle_deg: float) -> Float32:
 
 
 def streak(length: float, angle_deg: float) -> Float32:
-    """Weights of a centred segment of this length in pixels: each is the share of the segment that a bilinear pixel takes."""
+    """Weights of a centred segment of this length in pixels: each is the share of the segment in a bilinear pixel."""
     steps = max(1, math.ceil(8 * length))
     along = ((np.arange(steps) + 0.5) / steps - 0.5) * length
     x, y = along * math.cos(math.radians(angle_deg)), -along * math.sin(math.radians(angle_deg))

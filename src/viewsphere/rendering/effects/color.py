@@ -17,10 +17,10 @@ LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 
 
 def jitter(picture: Float32, brightness: float, contrast: float, saturation: float, hue: float) -> Float32:
-    """The picture with its colours changed, clipped to [0, 1]; alpha stays, and grey stays grey.
+    """The picture with its colours changed, clipped to [0, 1]; alpha is unchanged, and grey stays grey.
 
-    Light is multiplied by 2^brightness; then coded values move from 1/2 by 2^contrast; then the linear colour turns by `hue`
-    half turns about the grey axis and moves from grey by 1 + saturation, both at the same luminance.
+    Light is multiplied by 2^brightness; then coded values move from 1/2 by 2^contrast; then the linear colour rotates by `hue`
+    half turns about the grey axis, and its distance from grey is multiplied by 1 + saturation. Both keep the luminance.
     """
     if brightness == contrast == saturation == hue == 0:
         return picture
@@ -43,7 +43,7 @@ def tone_table(brightness: float, contrast: float) -> Float32:
 
 
 def chroma_matrix(saturation: float, hue: float) -> NDArray[np.float64]:
-    """Linear sRGB to linear sRGB, (3, 3): rows sum to 1, luminance stays.
+    """A matrix from linear sRGB to linear sRGB, (3, 3): rows sum to 1, luminance is kept.
 
     Around grey a colour has two components in the plane of equal luminance; they are turned in an orthonormal basis of that
     plane.
@@ -61,6 +61,6 @@ def chroma_matrix(saturation: float, hue: float) -> NDArray[np.float64]:
 
 @cache
 def _curve() -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Coded values and their light at the same nodes, which are denser where it is dark."""
+    """Coded values and their light at the same nodes, which are denser in the dark range."""
     codes = np.arange(4097) / 4096
     return codes, linear(codes)

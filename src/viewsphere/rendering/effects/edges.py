@@ -1,4 +1,4 @@
-"""Lines along the targets' borders and creases, as early computer graphics drew them over pictures."""
+"""Lines along the targets' borders and creases, drawn over the picture as in early computer graphics."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from viewsphere.rendering.spread import gaussian, spread_both_ways
 Float32 = NDArray[np.float32]
 
 CREASE = (0.25, 0.75)
-"""Change of slope from one pixel to the next at which a line begins to show, and at which it shows in full."""
+"""Change of slope between neighbouring pixels at which a line starts to appear, and at which it is fully visible."""
 
 WIDTH = 1 / 300
 """Width of the lines, in widths of the picture."""
 
 
 def edge_highlight(picture: Float32, strength: float, seen: Seen) -> Float32:
-    """The picture with lines that go towards white by `strength`; alpha stays."""
+    """The picture with lines that are blended towards white by `strength`; alpha is unchanged."""
     if strength == 0:
         return picture
     share = lines(seen)[..., None] * np.float32(strength)
@@ -29,7 +29,7 @@ def edge_highlight(picture: Float32, strength: float, seen: Seen) -> Float32:
 
 
 def lines(seen: Seen) -> Float32:
-    """Return the share of a line in each pixel, (H, W) float32 in [0, 1].
+    """Return the coverage by lines of each pixel, (H, W) float32 in [0, 1].
 
     The inverse depth of a plane is linear in the picture, so its second difference is not 0 only at creases and steps.
     """
@@ -43,7 +43,9 @@ def lines(seen: Seen) -> Float32:
 
 
 def crease(inverse_depth: Float32, focal: float) -> Float32:
-    """Change of the surface's slope from a pixel to the next, about the tangent of the angle; (H, W), 0 where empty."""
+    """Change of the surface's slope from one pixel to the next, approximately the tangent of the angle; (H, W), 0 where
+    empty.
+    """
     q = np.pad(inverse_depth, 1, mode="edge")
     middle = q[1:-1, 1:-1]
     across = np.abs(q[1:-1, :-2] - 2 * middle + q[1:-1, 2:])

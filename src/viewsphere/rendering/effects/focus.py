@@ -16,21 +16,24 @@ FAR = 1 / 40
 """Radius, in widths, of the disc that a point at infinity becomes at strength 1."""
 
 NEAREST = 2.0
-"""Nearer than a third of the focus distance discs grow no more: they are at most so many times `FAR`."""
+"""Largest disc, as a multiple of `FAR`: discs stop growing nearer than a third of the focus distance."""
 
 TAPS = 24
-"""Pixels of a disc's radius that are visited: for larger discs every second (third, ...) pixel stands for those around it."""
+"""Largest radius, in pixels, of a disc whose pixels are all visited. In larger discs, every second (third, ...) pixel
+represents its neighbours.
+"""
 
 STEP = 1.0
-"""Pixels by which the disc's radius differs at most between neighbours of one surface."""
+"""Largest difference, in pixels, between the disc radii of neighbouring pixels of one surface."""
 
 
 def depth_of_field(picture: Float32, strength: float, focus: float, inverse_depth: Float32) -> Float32:
     """The picture through a thin lens whose sharp plane is `focus` metres away; inverse depth (H, W), 0 is infinitely far.
 
-    Every pixel is spread over its disc. A pixel behind a sharp or less blurred one does not spread over that one; a pixel in
-    front of the focus spreads over everything, and what its soft border would reveal is filled in from beside. Pixels at a
-    depth step show both sides: before, they get the colour of their own side, and after, they are softened over three pixels.
+    Every pixel is spread over its disc. A pixel behind a sharp or less blurred pixel does not spread over that pixel. A pixel
+    in front of the focus spreads over everything, and the background behind its soft border is filled in from the
+    neighbourhood. Pixels at a depth step show both sides: before the spreading, they get the colour of their own side;
+    afterwards, they are softened over three pixels.
     """
     largest = strength * FAR * picture.shape[1]
     if largest < 1e-3:
@@ -76,7 +79,9 @@ def disc_area(radius: Float32, stride: int = 1) -> Float32:
 
 
 def _thinned(picture: Float32, radius: Float32, stride: int) -> Float32:
-    """The picture with a mean over the pixels that each visited pixel stands for, wherever discs are larger than the stride."""
+    """The picture with each visited pixel replaced by the mean of the pixels it represents, wherever discs are larger than the
+    stride.
+    """
     share = np.clip(radius * np.float32(1 / stride) - np.float32(0.5), 0, 1)[..., None]
     means = spread_both_ways(picture, box((stride - 1) / 2))
     return (picture + (means - picture) * share).astype(np.float32)

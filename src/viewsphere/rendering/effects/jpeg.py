@@ -12,7 +12,7 @@ BEST, WORST = 95, 5
 
 
 def jpeg(pixels: NDArray[np.uint8], strength: float) -> NDArray[np.uint8]:
-    """Bytes (H, W, 3) or (H, W, 4) encoded and decoded again, colours at half the resolution; alpha stays."""
+    """Bytes (H, W, 3) or (H, W, 4) encoded and decoded again, with colours at half the resolution; alpha is unchanged."""
     if strength == 0:
         return pixels
     from PIL import Image

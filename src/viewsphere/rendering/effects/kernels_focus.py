@@ -1,6 +1,7 @@
 """Pixels spread over discs of their own size, in depth order.
 
-Planes and scratch are one flat array each, and lines always have `LINE` pixels: so the compiler can work on eight at once.
+Planes and scratch are one flat array each, and lines always have `LINE` pixels, so that the compiler can process eight pixels
+at once.
 """
 
 from __future__ import annotations
@@ -19,12 +20,12 @@ LINE = 64  # pixels in a line; loops over fewer would be unrolled instead of vec
 LINES = 16
 RADIUS, NEAR = 1, 2
 BEHIND, FRONT = 0, 1
-MADE_UP = f4(0.05)  # weight of colours filled in behind something near: it counts where little else spreads
+MADE_UP = f4(0.05)  # weight of colours filled in behind near objects: it matters where little else spreads
 
 
 @inner(fastmath=FAST)
 def _reaches(radius, near, margin, slack, y0, x0, rows):
-    """The largest disc that reaches some lines of pixels, and the largest in front of the focus; -1 where none does."""
+    """The largest disc that reaches some lines of pixels, and the largest in front of the focus; -1 if none does."""
     largest, nearest = f4(-1), f4(-1)
     for y in range(y0, y0 + rows + 2 * margin):
         down = max(y0 + margin - y, y - (y0 + rows - 1 + margin))
@@ -73,7 +74,7 @@ def _gather(p, plane, width, at, channels, reach, stride, layer, b):
 
 @inner(fastmath=FAST)
 def _mix(b, channels, has_near, y, x0, out):
-    """Lay the layer in front of the focus over the other layer; where that one is empty, the front layer stands alone."""
+    """Lay the layer in front of the focus over the other layer; where the other layer is empty, only the front layer counts."""
     back, front = LINE, LINE * (channels + 2)
     for i in range(min(LINE, out.shape[1] - x0)):
         rest, over = b[back + LINE * channels + i], f4(0)
@@ -91,8 +92,8 @@ def _mix(b, channels, has_near, y, x0, out):
 def spread_discs(planes, margin, stride, out):
     """out (H, W, C) from planes (4 + C + 1, h, w) with a margin and, on the right, `LINE` pixels more.
 
-    Planes: signed radius, radius, whether in front of the focus, 1 / the sum of a disc's weights, the colours, ones. Of each
-    disc every `stride`-th pixel across and down counts.
+    Planes: signed radius, radius, whether in front of the focus, 1 / the sum of a disc's weights, the colours, ones. In each
+    disc, every `stride`-th pixel across and down counts.
     """
     height, width, channels = out.shape
     flat, plane, wide = planes.reshape(-1), planes.shape[1] * planes.shape[2], planes.shape[2]

@@ -1,4 +1,4 @@
-"""The effects of a lens on colours and light away from its axis."""
+"""Lens effects away from the axis: chromatic aberration and vignetting."""
 
 from __future__ import annotations
 
@@ -17,7 +17,9 @@ DARKEST = 0.1
 
 
 def chromatic_aberration(picture: Float32, strength: float, intrinsics: Intrinsics) -> Float32:
-    """Red and blue scaled about the principal point, against each other; alpha covers all three."""
+    """The picture with red and blue scaled about the principal point in opposite directions; alpha covers all three
+    channels.
+    """
     if strength == 0:
         return picture
     out = picture.copy()
@@ -30,7 +32,7 @@ def chromatic_aberration(picture: Float32, strength: float, intrinsics: Intrinsi
 
 
 def _scaled(plane: Float32, scale: float, intrinsics: Intrinsics) -> Float32:
-    """The plane (H, W) enlarged about the principal point, bilinear; its border goes on for ever."""
+    """The plane (H, W) enlarged about the principal point, bilinear; its border pixels extend outwards without end."""
     for axis, center in ((0, intrinsics.cy), (1, intrinsics.cx)):
         size = plane.shape[axis]
         at = np.clip((np.arange(size) + 0.5 - center) / scale + center - 0.5, 0, size - 1)
@@ -43,7 +45,9 @@ def _scaled(plane: Float32, scale: float, intrinsics: Intrinsics) -> Float32:
 
 
 def vignetting(picture: Float32, strength: float, intrinsics: Intrinsics) -> Float32:
-    """Light that falls off as cos^4 of the angle to the axis, an angle chosen for the farthest corner's share; alpha stays."""
+    """The picture with a falloff of cos^4 of the angle to the axis, scaled to the farthest corner's share; alpha is
+    unchanged.
+    """
     if strength == 0:
         return picture
     height, width = picture.shape[:2]

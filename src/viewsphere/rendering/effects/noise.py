@@ -1,4 +1,4 @@
-"""A sensor's noise: the chance of single photo-electrons, and that of its electronics."""
+"""A sensor's noise: shot noise of photo-electrons and read noise of the electronics."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ READ = 0.03
 
 
 def noise(picture: Float32, shot: float, read: float, seed: int) -> Float32:
-    """The light counted and read out, each channel of each pixel by itself, clipped to [0, 1].
+    """The picture with shot and read noise, independent for each channel of each pixel, clipped to [0, 1].
 
     Light v becomes Poisson(v n) / n with n = ELECTRONS / shot^2, then a Gaussian is added. Premultiplied colours get the noise
-    of the unpremultiplied colour times alpha; alpha stays. The same seed makes the same noise.
+    of the unpremultiplied colour times alpha; alpha is unchanged. The same seed gives the same noise.
     """
     if shot == 0 and read == 0:
         return picture

@@ -1,1 +1,1 @@
-"""The ground: its material, its slabs, where it fades into the sky."""
+"""The ground: its material, its slabs, and its fading into the sky."""

@@ -1,7 +1,7 @@
 """Concrete slabs as a formula: the shade of a floor at any place, without a texture, filtered to the size of a pixel.
 
 Value noise on a lattice that repeats (Lewis, *Algorithms for Solid Noise Synthesis*, 1989), of four wavelengths, and thin
-joints. The shade depends on the place alone, so that every renderer can be given the same floor.
+joints. The shade depends only on the position, so that every renderer can show the same floor.
 """
 
 from __future__ import annotations
@@ -13,10 +13,10 @@ from viewsphere.rendering.ground.material import PERIOD
 JOINT = 0.01
 """Width of a joint, in slabs."""
 
-_OCTAVES = ((2, 0.10), (8, 0.08), (32, 0.10), (128, 0.16))  # lattice cells a slab, amplitude
-_GAP = 0.4  # the share of light that a joint swallows
+_OCTAVES = ((2, 0.10), (8, 0.08), (32, 0.10), (128, 0.16))  # lattice cells per slab, amplitude
+_GAP = 0.4  # the share of light that a joint absorbs
 _MEAN = 1 - 2 * _GAP * JOINT  # of the shade; joints cross in a negligible part
-_MOST = 1e6  # slabs from the origin: beyond, the noise would not be a number
+_MOST = 1e6  # slabs from the origin: farther away, the noise would be NaN
 
 
 def shade(x: Lanes, y: Lanes, pixel: Lanes) -> Lanes:
@@ -32,7 +32,7 @@ def shade(x: Lanes, y: Lanes, pixel: Lanes) -> Lanes:
 
 
 def _noise(x: Lanes, y: Lanes, mask: int) -> Lanes:
-    """Between -1 and 1, smooth from lattice point to lattice point; the lattice repeats after mask + 1 points."""
+    """Noise between -1 and 1, smooth between lattice points; the lattice repeats after mask + 1 points."""
     left, top = floor(x), floor(y)
     across, down = (_smooth(v) for v in (x - left, y - top))
     columns, rows = ((i & mask, (i + 1) & mask) for i in (left.whole(), top.whole()))
@@ -46,7 +46,7 @@ def _smooth(x: Lanes) -> Lanes:
 
 
 def _value(column: Lanes, row: Lanes) -> Lanes:
-    """A number from -1 to 1 that looks random, of each lattice point."""
+    """A pseudo-random number from -1 to 1 for each lattice point."""
     bits = (column * 0x2C1B3C6D) ^ (row * 0x297A2D39)
     return ((bits ^ (bits >> 15)) * 0x1B873593).real() * (1 / 2**31)
 

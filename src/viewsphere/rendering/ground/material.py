@@ -1,4 +1,5 @@
-"""The ground's material: its pictures repeat over the world, u along x and v against y, so that they lie as on a map.
+"""The ground's material: its pictures repeat over the world, with u along x and v against y, so that they are oriented like a
+map.
 
 Distance needs no special rule: a far pixel covers many repeats, and the last mip level, one texel, is their mean.
 """
@@ -31,21 +32,20 @@ IMAGES = ("image", "roughness_image", "normal_image")
 def ground_material(ground: Ground) -> tuple[Material, tuple[Image, ...]]:
     """The ground as a glTF material and the images it names; equal grounds give the same objects while files do not change.
 
-    Textures are used with (x, -y) / tile of the world; a picture that is not square keeps the proportions of the first picture
-    named. Where `image` is clear the ground's colour alone is seen; of `roughness_image` green counts, as in glTF. A
-    substance has pictures of its own, and says what is metal. Raises RecipeError, naming the field, for a picture that cannot
-    be read.
+    Texture coordinates are (x, -y) / tile in the world; a non-square picture keeps the proportions of the first picture named.
+    Transparent parts of `image` show the ground's colour. `roughness_image` uses its green channel, as in glTF. A substance has
+    its own pictures, including metallic. Raises RecipeError, naming the field, for a picture that cannot be read.
     """
     return _material(ground.model_dump_json(), ground_stamps(ground))
 
 
 def ground_stamps(ground: Ground) -> tuple[Stamp, ...]:
-    """The stamps of the files that a ground names; raises RecipeError where one is missing."""
+    """The stamps of the files that a ground names; raises RecipeError if one is missing."""
     return tuple(stamp_of(path, f"scene.ground.{name}") for name in IMAGES if (path := getattr(ground, name)))
 
 
 def only_scatters(ground: Ground) -> bool:
-    """Return whether the ground mirrors nothing, and no picture says what it is made of."""
+    """Return whether the ground has no reflections and no picture or substance defines its material."""
     pictured = ground.material is not None or any(getattr(ground, name) for name in IMAGES)
     return ground.roughness == 1 and ground.metallic == 0 and not pictured
 
@@ -54,12 +54,12 @@ def ground_frame(ground: Ground, material: Material, origin: ArrayLike, unit: fl
     """(per_length, u0, v0) with which a point (x, y) in units from `origin`, world metres, has the texture coordinates
     u = u0 + per_length x, v = v0 - per_length y.
 
-    u0 and v0 are less than one repeat: far from the world's origin single precision would lose the texels.
+    u0 and v0 are less than one repeat, because single precision would lose the texels far from the world's origin.
     """
     x, y, _ = np.asarray(origin, np.float64)
     used = material.base_color_texture or material.normal_texture or material.metallic_roughness_texture
     across, down = used.scale if used else (SLABS / PERIOD,) * 2
-    middle = 0.5 / SLABS if ground.has_slabs else 0.0  # what stands at the world's origin stands on a slab, not on a joint
+    middle = 0.5 / SLABS if ground.has_slabs else 0.0  # an object at the world's origin is on a slab, not on a joint
     u, v = x / ground.tile + middle, middle - y / ground.tile
     return unit / ground.tile, math.fmod(u, 1.0 / across), math.fmod(v, 1.0 / down)
 
@@ -101,7 +101,7 @@ def _material(described: str, stamps: tuple[Stamp, ...]) -> tuple[Material, tupl
 
 
 def _image(name: str, path: str) -> Image:
-    """The picture that a field names, as glTF wants it for that field's use."""
+    """The picture that a field names, in glTF's channel layout for that field."""
     pixels = opaque_picture(path, f"scene.ground.{name}", on_white=name == "image")
     if name == "roughness_image":
         pixels[..., 2] = 255

@@ -1,1 +1,1 @@
-"""Light from far away: daylight, the sun, pictures of the whole sphere."""
+"""Distant light: daylight, the sun, and pictures of the whole sphere."""

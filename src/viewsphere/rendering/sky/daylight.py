@@ -12,22 +12,24 @@ from viewsphere.model.scene import Daylight, Sun
 Float = NDArray[np.float64]
 
 _WHITE = 33.3
-"""kcd/m2 that make a radiance of 1: so the sun's usual strength, 3, is 100 klx, what arrives through clear air (IES RP-21)."""
+"""Luminance in kcd/m2 of a radiance of 1: the sun's default strength, 3, is then 100 klx, as through clear air (IES RP-21)."""
 _CLEAR = 1.8
-"""Factor by which Preetham's sky is too bright. At turbidity 3 and with the sun at 45 degrees it sheds 29 klx on level ground;
-clear skies shed 14 klx (IES RP-21: 0.8 + 15.5 sine^0.5 klx). Zotti et al. 2007 find the same.
+"""Factor by which Preetham's sky is too bright. At turbidity 3 and with the sun at 45 degrees, it gives 29 klx on level ground;
+clear skies give 14 klx (IES RP-21: 0.8 + 15.5 sine^0.5 klx). Zotti et al. 2007 find the same.
 """
 _BALANCED = np.array([0.92, 1.02, 1.09])
-"""Factors of the sky's red, green and blue: a picture balanced for the sun, whose light at noon is yellower than the white of
-sRGB but whose usual colour is nearly white.
+"""Factors of the sky's red, green and blue: they balance the picture for the sun. Sunlight at noon is yellower than sRGB's
+white, while the sun's default colour is nearly white.
 """
 _PALE, _PALER = 0.3, 0.1
-"""Share by which Preetham's horizon is too dark beside the CIE's clear sky (S 011, type 12); the sine over which that fades."""
-_EXPOSED = 4.2
-"""Light on an exposure meter for which the lens is not changed. Clear noon brings a quarter of that, so the lens is opened by
-one and a half stops: asphalt and grass come out as in photographs of streets, and white walls in the sun just short of white.
+"""Share by which Preetham's horizon is too dark compared to the CIE's clear sky (S 011, type 12), and the sine of the elevation
+over which this share fades.
 """
-_OPENED = 0.75  # share of the missing stops by which the lens is opened
+_EXPOSED = 4.2
+"""Light on an exposure meter at which the exposure is unchanged. Clear noon has a quarter of that, so the aperture opens by one
+and a half stops. Asphalt and grass then look as in street photographs, and sunlit white walls are just below white.
+"""
+_OPENED = 0.75  # share of the missing stops by which the aperture opens
 _LOWEST = 0.01  # sine of the lowest elevation whose colour is computed; below, the sky has this colour down to the horizon
 _GROUND_FADE = 0.09  # sine of the depression below the horizon at which the sky begins to fade into ground
 _GROUND_HAZE = 0.12  # sine of the further depression over which it fades
@@ -55,10 +57,11 @@ _ZENITH = np.array(
 
 
 def opening(elevation_deg: float, daylight: Daylight) -> float:
-    """Factor of all daylight, sun and sky alike: how far a photographer opens the lens, so that evenings and clouds are seen.
+    """Factor for all daylight, sun and sky alike: the aperture that a photographer would choose to make evenings and clouds
+    visible.
 
-    A hemisphere measures the light, as an exposure meter does; three quarters of the stops that the light lacks are made up
-    for. `strength` does not count: a sky that a user makes brighter stays so.
+    The light is measured over a hemisphere, as by an exposure meter, and three quarters of the missing stops are compensated.
+    `strength` is not included, so that a sky made brighter by the user stays brighter.
     """
     return (_EXPOSED / _measured(elevation_deg, daylight)) ** _OPENED
 
@@ -73,7 +76,9 @@ def _measured(elevation_deg: float, daylight: Daylight) -> float:
 
 
 def air(elevation_deg: float, daylight: Daylight) -> Float:
-    """Share of the sun's red, green and blue that passes the air, (3,): about 1 at 60 degrees in ordinary air, 0 in cloud."""
+    """Share of the sun's red, green and blue that passes through the air, (3,): about 1 at 60 degrees in ordinary air, 0 in
+    cloud.
+    """
     through = _transmittance(elevation_deg, daylight.turbidity) / _transmittance(60.0, 3.0)
     return through * (1 - daylight.clouds)
 
@@ -87,7 +92,7 @@ def _transmittance(elevation_deg: float, turbidity: float) -> Float:
 
 
 def daylight_picture(elevation_deg: float, daylight: Daylight, height: int) -> NDArray[np.float32]:
-    """The sky, (height, 2 * height, 3): equirectangular, z up, the sun in the middle column; of strength 1.
+    """The sky at strength 1, (height, 2 * height, 3): equirectangular, z up, the sun in the middle column.
 
     Below the horizon its light fades to half as much, with less colour.
     """
@@ -124,9 +129,9 @@ def _clear(sine: Float, toward: Float, sun: float, turbidity: float) -> Float:
 
 
 def _daylight_locus(x: Float) -> Float:
-    """The least y of daylight with this x: Perez' fit turns purple far from the sun, as no sky does.
+    """The least y of daylight with this x. It limits Perez' fit, which turns purple far from the sun, unlike any real sky.
 
-    The curve through all measured daylight of Judd et al. 1964, as CIE 15 has it; level where it would bend down.
+    The curve through all measured daylight of Judd et al. 1964, in the form of CIE 15; constant where it would bend down.
     """
     x = np.clip(x, 0.25, 2.87 / 6)
     return -3 * x * x + 2.87 * x - 0.275

@@ -1,4 +1,4 @@
-"""Environment pictures, of the whole sphere: Radiance HDR (RGBE) and OpenEXR, and ordinary pictures as a makeshift."""
+"""Environment pictures of the whole sphere: Radiance HDR (RGBE), OpenEXR, and ordinary pictures as a fallback."""
 
 from __future__ import annotations
 
@@ -25,25 +25,27 @@ SHARPEST = 4096
 """Greatest width, in texels, at which an environment is kept."""
 
 _MOST_MENDED = 0.01  # greatest share of texels that may be NaN
-_BRIGHTEST = 1e6  # radiance from which on a texel counts as infinite
-_ROUNDING = -1e-3  # least radiance that counts as the rounding of a compression
+_BRIGHTEST = 1e6  # radiance above which a texel counts as infinite
+_ROUNDING = -1e-3  # negative radiance down to this counts as a compression error
 
 
 @dataclass(frozen=True, eq=False)
 class EnvironmentPicture:
-    """pixels (H, W, 3) float32: linear radiance, none negative, rows from the zenith down; notes: what had to be mended."""
+    """pixels (H, W, 3) float32: linear radiance, none negative, rows from the zenith down; notes: the repairs that were
+    needed.
+    """
 
     pixels: Float32
     notes: tuple[str, ...]
 
 
 def read_environment(path: Path) -> EnvironmentPicture:
-    """Read an equirectangular picture, its format told by its content, not by its name; reduced to at most `SHARPEST` wide.
+    """Read an equirectangular picture, reduced to at most `SHARPEST` wide. Its content, not its name, determines the format.
 
-    A few NaN texels become 0, infinite ones the greatest radiance there is, negative ones 0. PNG, JPEG and the
-    like are taken as sRGB. Raises RecipeError, beginning with the recipe's field, for a file that does not exist, cannot be
-    read, is damaged, has more pixels than `limits` allows, is not twice as wide as high, or is NaN in more than a hundredth of
-    its texels.
+    A few NaN texels become 0, infinite ones the greatest finite radiance, negative ones 0. PNG, JPEG and similar pictures are
+    read as sRGB. Raises RecipeError, beginning with the recipe's field, for a file that does not exist, cannot be read, is
+    damaged, has more pixels than `limits` allows, is not twice as wide as high, or is NaN in more than a hundredth of its
+    texels.
     """
     try:
         return _read(path)
@@ -129,7 +131,7 @@ def _read_ordinary(path: Path) -> Float32:
 
 
 def _mended(path: Path, pixels: Float32, notes: list[str]) -> Float32:
-    """The pixels with every texel made a finite number of at least 0; adds to `notes` what had to be mended."""
+    """The pixels with every texel made a finite number of at least 0; adds the repairs to `notes`."""
     low, high = float(pixels.min()), float(pixels.max())
     if low >= 0 and 0 < high <= _BRIGHTEST:
         return pixels
@@ -152,7 +154,7 @@ def _mended(path: Path, pixels: Float32, notes: list[str]) -> Float32:
 
 
 def _reduced(pixels: Float32) -> Float32:
-    """The picture reduced to at most `SHARPEST` wide: each texel the mean of all that it covers."""
+    """The picture reduced to at most `SHARPEST` wide: each texel is the mean of the texels that it covers."""
     from PIL import Image
 
     if pixels.shape[1] <= SHARPEST:

@@ -1,4 +1,4 @@
-"""The head of an environment picture (whole sphere), OpenEXR or Radiance HDR: its properties, read without its pixels.
+"""The header of an environment picture (whole sphere), OpenEXR or Radiance HDR, read without its pixels.
 
 Radiance's picture format, Ward 1991: https://radsite.lbl.gov/radiance/refer/filefmts.pdf.
 """
@@ -37,8 +37,8 @@ class ExrHead:
 
 @dataclass(frozen=True)
 class HdrHead:
-    """The text of a Radiance file before its pixels, line feeds alone; the directions of its rows and columns, such as -Y and
-    +X, and their numbers.
+    """The text of a Radiance file before its pixels, with plain line feeds; the directions of its rows and columns, such as -Y
+    and +X, and their numbers.
     """
 
     text: bytes
@@ -54,7 +54,7 @@ class HdrHead:
 
 
 def read_head(path: Path) -> ExrHead | HdrHead | None:
-    """The head of a file; its first bytes, not its name, tell the format. None for any other format.
+    """The header of a file; its first bytes, not its name, determine the format. None for any other format.
 
     Raises UnreadableError, whose message names the file, if the file cannot be opened, is damaged, lacks colours, has more
     pixels than `limits` allows, or is not twice as wide as high.
@@ -103,7 +103,7 @@ def _unreadable(path: Path, found: str) -> UnreadableError:
 
 
 def openexr(path: Path) -> Any:
-    """The package that reads this EXR file; raises MissingExtraError where it is not installed."""
+    """The package that reads this EXR file; raises MissingExtraError if it is not installed."""
     try:
         import OpenEXR
     except ImportError:

@@ -9,9 +9,11 @@ from viewsphere.kernels.jit import inner, njit
 
 @njit
 def decode_rows(data, row, out):
-    """The number of undamaged rows among a picture's bytes, their pixels in out (rows, columns, 3) float32, which comes zeroed.
+    """Decode the undamaged rows of a picture's bytes into out (rows, columns, 3) float32, zeroed by the caller; return their
+    number.
 
-    row (columns, 4) uint8 is room for one row. The caller brings out, so that rows which a cut file lacks take no memory.
+    row (columns, 4) uint8 is scratch for one row. The caller allocates out, so that rows missing from a truncated file take no
+    memory.
     """
     rows, columns = out.shape[:2]
     at = 0
@@ -33,7 +35,7 @@ def decode_rows(data, row, out):
 
 @inner
 def _new_row(data, at, row):
-    """Decode a row in the new encoding; returns where the next row begins, -1 if this row is damaged."""
+    """Decode a row in the new encoding; return the offset of the next row, or -1 if this row is damaged."""
     at += 4
     for c in range(4):
         j = 0

@@ -1,4 +1,4 @@
-"""Any sky as pictures of the whole sphere: the light on the scene, and the sky seen behind it."""
+"""Skies as pictures of the whole sphere: the light on the scene, and the sky visible behind it."""
 
 from __future__ import annotations
 
@@ -18,18 +18,18 @@ Float = NDArray[np.float64]
 Float32 = NDArray[np.float32]
 
 SURROUNDINGS = 0.3
-"""Reflectance of the imagined ground below a made sky's horizon where the scene has no ground."""
+"""Reflectance of the assumed ground below a synthetic sky's horizon if the scene has no ground."""
 
 HALO = 0.32
 """Radiance of the glow around the sun in a gradient, as a share of the sun's irradiance."""
 
 HEIGHT = 256
-"""Rows of the picture that is made of a gradient or daylight."""
+"""Rows of the picture made from a gradient or daylight."""
 
 
 class SkyPictures(NamedTuple):
-    """Equirectangular radiance (H, W, 3) float32: rows from the zenith down, the middle towards +X, the left quarter
-    towards +Y; both turn by turn_deg about z, counter-clockwise from above. `seen` is `lighting` where they are the same.
+    """Equirectangular radiance (H, W, 3) float32: rows from the zenith down, the middle towards +X, the left quarter towards
+    +Y; both are rotated by turn_deg about z, counter-clockwise from above. `seen` is the object `lighting` if both are equal.
     """
 
     lighting: Float32
@@ -38,9 +38,9 @@ class SkyPictures(NamedTuple):
 
 
 def sky_pictures(sky: AnySky, sun: Sun | None, lights: Sequence[AnyLight], has_ground: bool) -> SkyPictures:
-    """The sky with the light of all hemisphere lights, without the sun unless a photograph shows it.
+    """The sky with the light of all hemisphere lights, without the sun except in photographs that show it.
 
-    Without a ground there is grey below a made sky, which reflects the light that it receives. Raises RecipeError when a
+    Without a ground, the area below a synthetic sky is grey and reflects the light that it receives. Raises RecipeError when a
     picture cannot be read.
     """
     from viewsphere.rendering.sky.environment_file import read_environment  # whose kernels take a second to load
@@ -68,7 +68,7 @@ def sky_pictures(sky: AnySky, sun: Sun | None, lights: Sequence[AnyLight], has_g
 def even_light(lights: Sequence[AnyLight]) -> Float:
     """Radiance from above and from below that all hemisphere lights add to the ambient light, (2, 3).
 
-    On a normal with this z: irradiance / pi = above * (1 + z) / 2 + below * (1 - z) / 2.
+    For a surface normal with this z: irradiance / pi = above * (1 + z) / 2 + below * (1 - z) / 2.
     """
     even = [light for light in lights if isinstance(light, HemisphereLight)]
     return sum((light.strength * np.array([light.color, light.below]) for light in even), np.zeros((2, 3)))
@@ -98,7 +98,7 @@ def _halo(sun: Distant | None, sine: Float) -> Float32:
 
 
 def _with_even(picture: Float32, even: Float) -> Float32:
-    """The picture with more light from above and from below; the same array where there is no such light."""
+    """The picture with more light from above and from below; the same array if there is no such light."""
     if not even.any():
         return picture
     half = len(picture) // 2

@@ -1,4 +1,4 @@
-"""The sun, as its light arrives at the scene."""
+"""The sun's light as it arrives at the scene."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 """The effect of weather on the light of sun and sky: clouds cover them, fog spreads the remaining light.
 
-A layer of optical depth t lets exp(-t / sine of the sun's elevation) of the sun pass as a beam, and of all light
-1 / (1 + 3/4 (1 - g) t), with asymmetry g, as the two-stream approximation has it (Meador and Weaver 1980).
+A layer of optical depth t lets exp(-t / sine of the sun's elevation) of the sun pass as a beam, and of all light 1 / (1 + 3/4
+(1 - g) t), with asymmetry g, according to the two-stream approximation (Meador and Weaver 1980).
 """
 
 from __future__ import annotations
@@ -19,10 +19,10 @@ from viewsphere.rendering.sky.sun import sun_light
 Float = NDArray[np.float64]
 
 ASYMMETRY = 0.85
-"""Of droplets of cloud and fog."""
+"""Scattering asymmetry of droplets in cloud and fog."""
 
 LAYER = 60.0
-"""Metres of fog overhead, where nothing is said."""
+"""Default thickness of the fog layer overhead, in metres."""
 
 DARK = 0.3
 """Brightness of rain and snow clouds relative to others, at a photographer's exposure."""
@@ -31,7 +31,7 @@ METERED = 0.85
 """Radiance of thick fog as a photographer exposes it: a light grey."""
 
 CLOUD = 0.4
-"""Share of a clear sky's light, sun included, that comes through clouds, as far as a photographer does not open the lens."""
+"""Share of a clear sky's light, sun included, that passes through clouds, after a photographer's partial compensation."""
 
 
 def floor_light(sun: Sun | None, sky: AnySky) -> Float:
@@ -40,7 +40,9 @@ def floor_light(sun: Sun | None, sky: AnySky) -> Float:
 
 
 def clouded(sun: Sun | None, sky: AnySky, clouds: float) -> tuple[Sun | None, AnySky]:
-    """Sun and sky where so much of the sky is covered; a photographed sky shows its own clouds, and dims with its sun."""
+    """Sun and sky with this share of the sky covered by clouds. A photographed sky shows its own clouds, and dims with its
+    sun.
+    """
     if not clouds:
         return sun, sky
     if isinstance(sky, Daylight):
@@ -57,13 +59,13 @@ def clouded(sun: Sun | None, sky: AnySky, clouds: float) -> tuple[Sun | None, An
 
 
 def _mixed(sky: Sky, color: Color, clouds: float, level: float) -> Color:
-    """A colour of a sky of which so much is covered by clouds of this radiance."""
+    """A sky colour with this share covered by clouds of this radiance."""
     r, g, b = ((1 - clouds) * sky.strength * c + level for c in color)
     return r, g, b
 
 
 def in_fog(sun: Sun | None, sky: AnySky, fog: Fog) -> tuple[Sun | None, AnySky, HemisphereLight | None, Float]:
-    """Sun and sky as they come through fog, the light that ground fog spreads besides, and the radiance (3,) of the fog."""
+    """Sun and sky as seen through fog, the additional light that ground fog scatters, and the radiance (3,) of the fog."""
     depth = fog.extinction * (fog.height or LAYER)
     total, beam = floor_light(sun, sky), sun_light(sky, sun)
     light = total / (1 + 0.75 * (1 - ASYMMETRY) * depth)
@@ -83,7 +85,7 @@ def in_fog(sun: Sun | None, sky: AnySky, fog: Fog) -> tuple[Sun | None, AnySky, 
         r, g, b = np.maximum(light - direct, 0).tolist()
         return left, Sky(zenith=(r, g, b), horizon=(r, g, b)), None, light
     if isinstance(sky, Daylight):
-        return sun, sky, None, light  # whose sun follows from the air above; ground fog is thin
+        return sun, sky, None, light  # its sun follows from the air above; ground fog is thin
     sky = sky.model_copy(update={"strength": sky.strength * closed})
     spread = np.maximum(light - direct - received(sky_pictures(sky, None, (), True).lighting, None), 0)
     r, g, b = spread.tolist()

@@ -1,10 +1,10 @@
-"""Rain and snow in a picture: every drop has its place in the world and falls with time, so that sequences and several views
-of one moment show the same ones.
+"""Rain and snow in a picture: every drop has a position in the world and falls with time, so that sequences and several views
+of one moment show the same drops.
 
-The air falls with what is in it, in a few classes of sizes; each class is a lattice of cells whose drops follow from a seed and
-the cell alone. A drop of width w and speed v is exposed for T: its streak is v T long, and a pixel in it is covered for so much
-of T as the drop's area, spread over the streak's, says (Garg and Nayar, *Vision and Rain*, 2007). Drops beyond `REACH` are too
-thin to be told apart: together they are part of the scene's fog.
+Drops have a few size classes. Each class is a lattice of air cells that falls with its drops, which depend only on a seed and
+the cell. A drop of width w and speed v leaves a streak of length v T during the exposure T. It covers a pixel of the streak for
+a share of T: the drop's area divided by the streak's (Garg and Nayar, *Vision and Rain*, 2007). Drops beyond `REACH` are too
+thin to distinguish; together they are part of the scene's fog.
 """
 
 from __future__ import annotations
@@ -26,45 +26,45 @@ Float = NDArray[np.float64]
 Float32 = NDArray[np.float32]
 
 REACH = {"rain": 9.0, "snow": 14.0}
-"""Metres within which single drops and flakes are seen."""
+"""Distance in metres within which single drops and flakes are visible."""
 
 FAINTEST = 0.003
-"""Opacity below which a streak changes no byte of a picture by itself."""
+"""Opacity below which a single streak changes no byte of a picture."""
 
 NEAREST = 0.35
-"""Metres from the lens within which nothing falls: what keeps it dry."""
+"""Radius in metres around the lens without drops or flakes, as if the lens were sheltered."""
 
 SMALLEST, LARGEST = 0.8, 6.0
 """Diameters of drops, in millimetres, that are drawn."""
 
 CLASSES = 4
-"""Of sizes, each with one speed."""
+"""Number of size classes, each with one speed."""
 
 IN_A_CELL = 6.0
-"""Drops that a cell holds in the mean."""
+"""Mean number of drops in a cell."""
 
 MOST = 400_000
-"""Drops of a class in a picture, at most."""
+"""Maximum number of drops of one class in a picture."""
 
 APERTURE = 0.003
-"""Metres: the width of the lens, which blurs what is nearer than `FOCUS`, metres."""
+"""Width of the lens aperture in metres, which blurs drops nearer than `FOCUS`, metres."""
 
 FOCUS = 8.0  # metres: near drops are blurred and far ones sharp, as in photographs of rain. Chosen by sight
 SWIRL = 0.12
-"""Metres by which flakes swing from side to side."""
+"""Distance in metres by which flakes swing from side to side."""
 
 
 def fall_in(scene: Scene, picture: Float32, camera: Camera, seconds: float, inverse_depth: Float32) -> None:
-    """`fall` of all that falls in a scene."""
+    """Draw a scene's rain and snow with `fall`."""
     for falling in (scene.rain, scene.snow):
         if falling is not None:
             fall(picture, falling, camera, seconds, inverse_depth)
 
 
 def fall(picture: Float32, falling: Falling, camera: Camera, seconds: float, inverse_depth: Float32) -> None:
-    """Lay what falls over a picture (H, W, 4), scene-linear and premultiplied, in place, where nothing nearer is seen.
+    """Draw rain or snow over a picture (H, W, 4), scene-linear and premultiplied, in place, except behind nearer surfaces.
 
-    inverse_depth (H, W): as in `truth.raster.visibility.Visibility`, of the picture.
+    inverse_depth (H, W): the picture's, as in `truth.raster.visibility.Visibility`.
     """
     ends, width, soft, level, inverse = (np.concatenate(rows) for rows in zip(*_classes(falling, camera, seconds), strict=True))
     order = np.argsort(inverse, kind="stable")  # the nearest last
@@ -75,7 +75,7 @@ def fall(picture: Float32, falling: Falling, camera: Camera, seconds: float, inv
 
 
 def _classes(falling: Falling, camera: Camera, seconds: float) -> Iterator[tuple[Float, Float, Float, Float, Float]]:
-    """Of each class of sizes its streaks: ends (N, 4), width, softness, opacity and 1/depth (N,)."""
+    """Yield the streaks of each size class: ends (N, 4), width, softness, opacity and 1/depth (N,)."""
     edges = [diameter(falling, SMALLEST, LARGEST, i / CLASSES) for i in range(CLASSES + 1)]
     for i, (low, high) in enumerate(pairwise(edges)):
         velocity = np.array([*falling.wind, -speed(falling, diameter(falling, low, high, 0.5))])
@@ -89,7 +89,7 @@ def _classes(falling: Falling, camera: Camera, seconds: float) -> Iterator[tuple
 
 
 def _there(falling: Falling, kind: int, dense: float, moved: Float, camera: Camera) -> tuple[Float, Float]:
-    """Places (N, 3) in air that has `moved` so far, and shares (N, 3), of what is before a camera."""
+    """Positions (N, 3), in air that has `moved` so far, of the drops in front of a camera, and random shares (N, 3)."""
     from viewsphere.rendering.weather import kernels_falling as kernels
 
     reach, size = REACH["rain" if isinstance(falling, Rain) else "snow"], (IN_A_CELL / dense) ** (1 / 3)
@@ -101,7 +101,7 @@ def _there(falling: Falling, kind: int, dense: float, moved: Float, camera: Came
 
 
 def _cone(camera: Camera) -> float:
-    """Cosine of the angle between the camera's axis and what it sees farthest from it."""
+    """Cosine of the largest angle between the camera's axis and a visible direction."""
     if camera.lens.has_unit_rays:
         return -1.0
     rays = pixel_rays(camera.intrinsics)
@@ -117,7 +117,7 @@ def _swing(falling: Falling, shares: Float, seconds: float) -> Float:
 
 
 def _streaks(camera: Camera, before: Float, after: Float, wide: Float) -> tuple[Float, Float, Float, Float, Float]:
-    """Ends, width, softness, opacity and 1/depth of what moves from `before` to `after` (N, 3), world metres."""
+    """Ends, width, softness, opacity and 1/depth of drops that move from `before` to `after` (N, 3), world metres."""
     begin, end = (points @ camera.R.T + camera.t for points in (before, after))
     (first, _), (last, _) = project(camera.intrinsics, begin), project(camera.intrinsics, end)
     middle = (begin + end) / 2

@@ -1,7 +1,7 @@
-"""The air between things and the camera: Koschmieder's law (1924), in scene-linear light, with range along the ray.
+"""The air between objects and the camera: Koschmieder's law (1924), in scene-linear light, with range along the ray.
 
-I = J exp(-d) + A (1 - exp(-d)): J is the light of a surface, A that of the air. d, the optical depth of the ray, is in closed
-form: extinction times range, or, of air that is e times thinner every `height` metres above z = 0, its integral.
+I = J exp(-d) + A (1 - exp(-d)): J is the light of a surface, A the light of the air. d, the optical depth of the ray, has a
+closed form: extinction times range. If the air is e times thinner every `height` metres above z = 0, d is the integral.
 """
 
 from __future__ import annotations
@@ -19,16 +19,17 @@ Float = NDArray[np.float64]
 Float32 = NDArray[np.float32]
 
 LEVEL = 1e-6
-"""A rise, over a fog's height, of a ray that is as good as level."""
+"""Rise of a ray, in units of the fog's height, below which the ray counts as level."""
 
 OPAQUE = 80.0
-"""Optical depth of what has no end."""
+"""Optical depth of rays without end."""
 
 
 @dataclass(frozen=True, eq=False)
 class Air:
-    """The air along rays from one eye. stretch (N,): metres of range for a metre of their depth (see `Visibility`); rise
-    (N,): sine of their elevation. is_outdoors: it is beyond the windows of a room, and only ground and sky are seen through it.
+    """The air along rays from one eye. stretch (N,): metres of range for a metre of their depth (see `Visibility`); rise (N,):
+    sine of their elevation. is_outdoors: the air is beyond the windows of a room, and only ground and sky are visible through
+    it.
     """
 
     fog: Fog
@@ -39,14 +40,14 @@ class Air:
 
     @classmethod
     def of(cls, fog: Fog, camera: Camera, rays: NDArray[np.floating] | None = None, is_outdoors: bool = False) -> Air:
-        """The air before a camera, along rays (N, 3) of its axes, by default those of its pixels' centres."""
+        """The air in front of a camera, along rays (N, 3) in its axes, by default through its pixel centres."""
         ray = np.nan_to_num(pixel_rays(camera.intrinsics).reshape(-1, 3) if rays is None else rays)
         length = np.sqrt((ray * ray).sum(axis=1))
         rise = (ray @ camera.R[:, 2]) / np.maximum(length, 1e-12)
         return cls(fog, float(camera.center[2]), length.astype(np.float32), rise.astype(np.float32), is_outdoors)
 
     def depth(self, inverse: Float32, which: NDArray[np.integer] | slice = slice(None)) -> Float32:
-        """Optical depth (n,) of rays, by their numbers, from the eye to what has this 1/depth there; 0 is the sky."""
+        """Optical depth (n,) of the rays with these indices, from the eye to the surface with this 1/depth; 0 is the sky."""
         with np.errstate(divide="ignore", over="ignore"):
             away = self.stretch[which] / inverse
             if self.fog.height is None:
@@ -60,7 +61,7 @@ class Air:
             return found.astype(np.float32)
 
     def veil(self, radiance: Float32, depth: Float32, which: NDArray[np.integer] | slice = slice(None)) -> None:
-        """Dim light (N, 4), premultiplied, by an optical depth, and lay the air's own over what is covered, in place."""
+        """Dim light (N, 4), premultiplied, by an optical depth, and add the air's own light over the covered part, in place."""
         through = np.exp(-depth)
         light = radiance[which]
         color = np.array(self.fog.color, np.float32)
@@ -68,7 +69,7 @@ class Air:
         radiance[which] = light
 
     def behind(self, sky: Float32, alpha: Float32) -> Float32:
-        """The light (N, 3) that the sky's (N, 3) becomes, where `alpha` (N,) of it is hidden already."""
+        """The sky's light (N, 3) seen through the air, if `alpha` (N,) of it is hidden already."""
         through = np.exp(-self.depth(np.zeros(len(sky), np.float32)))
         glow = ((1 - alpha) * (1 - through))[:, None] * np.array(self.fog.color, np.float32)
         return np.add(sky * through[:, None], glow, dtype=np.float32)

@@ -1,4 +1,4 @@
-"""The places of drops and flakes, in cells of air that fall with them, and their streaks in a picture."""
+"""Positions of drops and flakes, in cells of air that fall with them, and their streaks in a picture."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def _mixed(x):
 
 @inner
 def _share(state):
-    """A number of [0, 1) for a state."""
+    """A number in [0, 1) from a state."""
     return float(_mixed(state) >> U64(11)) * (1.0 / 9007199254740992.0)
 
 
@@ -32,9 +32,10 @@ def _share(state):
 def scatter(seed, low, high, size, mean, moved, eye, ahead, reach, cosine, most):
     """Return the drops or flakes in the cells low..high (3,) int64, of `size` metres, that hold `mean` each.
 
-    moved (3,): the displacement of the air: a place in it is at that place plus `moved` in the world. Cells farther than
-    `reach` from the eye are left out. So are cells outside of a cone of this cosine around `ahead` (3,); a cosine of -1 is
-    everywhere. Returns places in the air (N, 3) and three numbers of [0, 1) each (N, 3), N no more than `most`.
+    moved (3,): the displacement of the air; a position in it plus `moved` is the position in the world. Cells farther than
+    `reach` from the eye are left out. So are cells outside of a cone of this cosine around `ahead` (3,); a cosine of -1
+    includes all directions. Returns positions in the air (N, 3) and three numbers in [0, 1) for each (N, 3), with N at most
+    `most`.
     """
     places, shares = np.empty((most, 3), np.float64), np.empty((most, 3), np.float64)
     n, radius, sine = 0, size * math.sqrt(3) / 2, math.sqrt(max(1 - cosine * cosine, 0.0))
@@ -52,7 +53,7 @@ def scatter(seed, low, high, size, mean, moved, eye, ahead, reach, cosine, most)
                 if cosine > -1 and across * cosine - along * sine > radius:
                     continue
                 state = _mixed(_mixed(_mixed(U64(seed) + step * U64(i)) + step * U64(j)) + step * U64(k))
-                # As many as a Poisson distribution gives, by inversion.
+                # The number follows a Poisson distribution, by inversion.
                 share, count, chance = _share(state), 0, math.exp(-mean)
                 below = chance
                 while share > below and count < 1000:
@@ -78,7 +79,7 @@ def draw(ends, width, soft, level, inverse, color, nearest, picture):
     """Lay streaks over a picture (H, W, 4), premultiplied, one after the other, where nothing is nearer.
 
     ends (N, 4) float64: x and y of both ends in pixels; width, soft (N,): pixels across, and over which a border fades; level
-    (N,): opacity; inverse (N,): 1/depth; color (3,); nearest (H, W): 1/depth of what the picture shows.
+    (N,): opacity; inverse (N,): 1/depth; color (3,); nearest (H, W): 1/depth of the surfaces in the picture.
     """
     height, columns = nearest.shape
     for n in range(ends.shape[0]):

@@ -1,5 +1,5 @@
-"""Materials from expressions of Blender's nodes (`blender.worker.files.nodes`): constants become factors, a picture used
-unchanged stays the texture, and an expression over pictures is baked into a new picture.
+"""Materials from expressions of Blender's nodes (`blender.worker.files.nodes`): constants become factors, an unchanged picture
+stays the texture, and an expression over pictures is baked into a new picture.
 """
 
 from __future__ import annotations
@@ -22,12 +22,14 @@ Told = Mapping[str, Any]
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722], np.float32)
 
 WALL = 0.003
-"""Metres: the glass of Blender's shaders refracts, however thick it is."""
+"""Thickness in metres for glass, since glass in Blender's shaders refracts at any thickness."""
 
 
 @dataclass(frozen=True)
 class Picture:
-    """A picture that nodes use: its index in the folder's images, None where it cannot be used; sRGB or plain numbers."""
+    """A picture that nodes use: its index in the folder's images, None if it cannot be used, and whether it is sRGB or plain
+    numbers.
+    """
 
     index: int | None
     is_srgb: bool
@@ -35,7 +37,7 @@ class Picture:
 
 @dataclass(eq=False)
 class Painter:
-    """Makes materials. Expressions refer to `pictures` by index, None for a picture that none uses; warnings go to `folder`."""
+    """Makes materials. Expressions refer to `pictures` by index; an unused picture is None. Warnings go to `folder`."""
 
     folder: ModelFolder
     pictures: Sequence[Picture | None]
@@ -148,7 +150,7 @@ class _Work:
         }
 
     def _occlusion(self) -> dict[str, Any]:
-        """The occlusion texture and its strength, where a picture gives the share of ambient light that arrives."""
+        """The occlusion texture and its strength, if a picture gives the arriving share of ambient light."""
         shade, strength = _faded(self.told["occlusion"])
         if not isinstance(self._usable(shade), dict):
             return {}
@@ -192,7 +194,7 @@ class _Work:
         return told if leaves else _plain(self.value(told))
 
     def _index(self, leaf: Told) -> int | None:
-        """Index of a leaf's picture in the folder's images; None where the picture or its texture coordinates are missing."""
+        """Index of a leaf's picture in the folder's images; None if the picture or its texture coordinates are missing."""
         has_uv = self.uvs[0] is not None and self._texcoord(leaf) is not None
         return self.painter.pictures[leaf["image"]].index if has_uv else None
 
@@ -218,7 +220,7 @@ class _Work:
         index, texcoord = self._index(leaf), self._texcoord(leaf)
         assert index is not None and texcoord is not None
         turn, (u, v), (x, y) = leaf["rotation"], leaf["scale"], leaf["offset"]
-        # Blender's v points up, glTF's down: in 1 - v the rotation has the other sense and another centre.
+        # Blender's v points up, glTF's down: in 1 - v the rotation has the opposite direction and another centre.
         offset = float(x - v * np.sin(turn)), float(1 - y - v * np.cos(turn))
         return Texture(
             index if image is None else image,
@@ -311,7 +313,7 @@ def _product(told: Any) -> tuple[Float, Any]:
 
 
 def _factors(told: Any) -> list[Any]:
-    """The factors of a product, with those of products within it."""
+    """The factors of a product, including those of nested products."""
     if isinstance(told, dict) and cast("Told", told)["do"] == "multiply":
         return [factor for of in cast("Told", told)["of"] for factor in _factors(of)]
     return [told]
@@ -329,7 +331,7 @@ def _is_paint(told: Any) -> bool:
 
 
 def _without_paint(told: Any) -> Any:
-    """The expression with 1 for vertex colours: the mesh brings them."""
+    """The expression with 1 instead of vertex colours, which the mesh supplies."""
     if not isinstance(told, dict):
         return told
     told = cast("Told", told)
@@ -339,14 +341,16 @@ def _without_paint(told: Any) -> Any:
 
 
 def _channel(told: Any) -> tuple[int | None, Any]:
-    """The number of the channel that an expression takes, and the expression that it is taken of."""
+    """The number of the channel that an expression selects, and its operand."""
     if isinstance(told, dict) and cast("Told", told)["do"] == "channel":
         return cast("Told", told)["which"], cast("Told", told)["of"][0]
     return None, told if isinstance(told, dict) else None
 
 
 def _faded(told: Any) -> tuple[Any, float]:
-    """An expression without the mix with white that Blender's glTF importer adds, and its share; else itself and 1."""
+    """An expression without the mix with white that Blender's glTF importer adds, and the mix's share; any other expression and
+    1.
+    """
     mixed = _inside(told, "grey")
     if isinstance(mixed, dict) and cast("Told", mixed)["do"] == "mix" and cast("Told", mixed)["how"] == "MIX":
         share, white, shade = cast("Told", mixed)["of"]
@@ -467,7 +471,7 @@ def _contrast(_: Told, color: Float, bright: Float, contrast: Float) -> Float:
 
 
 def _hue(_: Told, color: Float, hue: Float, saturation: Float, value: Float, share: Float) -> Float:
-    """Blender's Hue/Saturation/Value: a hue of 0.5 changes nothing; settings given by pictures count by their mean."""
+    """Blender's Hue/Saturation/Value: a hue of 0.5 changes nothing; settings given by pictures are replaced by their mean."""
     turned = _from_hsv(_to_hsv(color) + np.array([float(hue.mean()) - 0.5, 0, 0], np.float32), saturation, value)
     return _mix({"how": "MIX"}, share, color, turned)
 
@@ -496,7 +500,7 @@ def _combine(_: Told, *values: Float) -> Float:
 
 
 def _table(told: Told, value: Float) -> Float:
-    """A table's entry for each value, between 0 and 1."""
+    """A table's entry for each value in [0, 1]."""
     table = np.asarray(told["table"], np.float32)
     place = np.clip(value, 0, 1) * (len(table) - 1)
     low = np.minimum(place.astype(np.int64), len(table) - 2)

@@ -49,9 +49,9 @@ UNOPENED = re.compile(r"Could not open asset @([^@]+)@")
 
 
 def read_via_blender(folder: ModelFolder) -> tuple[Mesh, FileFacts]:
-    """The file as it would be rendered at its first frame, in Blender's axes (up +Z, front -Y) and metres.
+    """The file as rendered at its first frame, in Blender's axes (up +Z, front -Y) and metres.
 
-    Of a .blend file, the part that `folder.inside` names: an object with its children, a collection, or the whole file. Each
+    For a .blend file, the part that `folder.inside` names: an object with its children, a collection, or the whole file. Each
     object is one part; a part instanced by another object is named by both objects. Raises ModelError in one line.
     """
     return next(_read(folder, [None]))
@@ -93,7 +93,7 @@ def read_named(folder: ModelFolder) -> bytes:
     """
     data = folder.read_model()
     if folder.model.suffix.lower() == ".gltf":
-        with suppress(ValueError, TypeError, AttributeError):  # Blender reports a file that is no glTF
+        with suppress(ValueError, TypeError, AttributeError):  # Blender reports a file that is not glTF
             for buffer in json.loads(data)["buffers"]:
                 uri = str(buffer.get("uri", "data:"))
                 if not uri.startswith("data:"):
@@ -102,7 +102,7 @@ def read_named(folder: ModelFolder) -> bytes:
 
 
 def _check_beginning(folder: ModelFolder, kind: str, data: bytes) -> None:
-    """Refuse truncated files and other files named .abc, on which Blender crashes or reports nothing: Ogawa's header holds the
+    """Refuse truncated files and other files named .abc, on which Blender crashes or reports nothing. Ogawa's header holds the
     position of the root group, which is written last.
     """
     if kind == "abc" and not (data.startswith(b"Ogawa") and int.from_bytes(data[8:16], "little") < len(data)):
@@ -141,7 +141,7 @@ def asked(folder: ModelFolder, process: BlenderProcess, do: str, /, **told: Any)
 
 
 def why_no_answer(died: BlenderDied, seconds: float) -> str:
-    """The message for a Blender that ended, after so many seconds, instead of answering about a file."""
+    """The message for a Blender process that ended after this many seconds without an answer about a file."""
     if died.signal == "SIGXCPU" or died.is_late:
         return endings.too_slow(seconds)
     how = died.signal if died.signal in endings.FROM_OUTSIDE else died.how
@@ -149,7 +149,7 @@ def why_no_answer(died: BlenderDied, seconds: float) -> str:
 
 
 def _check_layers(folder: ModelFolder, log: Path) -> None:
-    """Record the layers of a USD file, as its library logs them; warn about layers that could not be read."""
+    """Record the layers of a USD file from its library's log; warn about layers that could not be read."""
     opened, missing = _layers(log)
     for name in sorted({*opened, *missing}):
         path = _layers_file(name)
@@ -169,7 +169,7 @@ def remember_layers(folder: ModelFolder, log: Path, begun: int) -> None:
 
 
 def _layers(log: Path, begun: int = 0) -> tuple[set[str], set[str]]:
-    """The layers of USD files that the log says were looked for, and the ones that could not be opened."""
+    """The layers of USD files that were searched according to the log, and those that could not be opened."""
     with open_file(log) as file:
         file.seek(begun)
         said = file.read().decode("utf-8", "replace")
@@ -177,7 +177,7 @@ def _layers(log: Path, begun: int = 0) -> tuple[set[str], set[str]]:
 
 
 def _layers_file(name: str) -> Path:
-    """The file of a layer; for a layer inside an archive the archive."""
+    """The file of a layer; for a layer inside an archive, the archive."""
     return Path(name.partition("[")[0])
 
 
@@ -225,7 +225,7 @@ def _points(folder: ModelFolder, told: Sequence[Mapping[str, Any]]) -> Keypoints
 
 
 def _marks(told: Sequence[Mapping[str, Any]]) -> tuple[Annotation, ...]:
-    """The marks that the file's objects are, in the axes of its mesh."""
+    """The annotations of the file's objects, in the axes of its mesh."""
 
     def place(point: Sequence[float]) -> Point:
         x, y, z = map(float, point)
@@ -291,7 +291,7 @@ def _picture(folder: ModelFolder, told: Mapping[str, Any], number: int) -> Pictu
 
 def _with_modes(folder: ModelFolder, pieces: Sequence[Primitive], materials: Sequence[Material]) -> list[Material]:
     """The materials with alpha modes that suit their textures' alpha (`alpha`); a rotated texture's alpha always blends."""
-    found = with_alpha_modes(folder, pieces, materials, stated=range(len(materials)))  # its links say what alpha is
+    found = with_alpha_modes(folder, pieces, materials, stated=range(len(materials)))  # its node links define alpha
     for i, material in enumerate(materials):
         texture = material.base_color_texture
         if texture is not None and (texture.rotation or min(texture.scale) < 0) and material.alpha_mode == "OPAQUE":

@@ -20,8 +20,8 @@ LUMINANCE = (0.212671, 0.715160, 0.072169)
 
 @dataclass(eq=False)
 class DaeMaterials:
-    """The materials that pieces use so far, `kept`; `stated` are the indices of those whose `<transparent>` holds a texture, so
-    that alpha is opacity. `root` is the file's tree, its tags without namespace.
+    """The materials that pieces use so far, `kept`; `stated` are the indices of the materials whose `<transparent>` holds a
+    texture, so that alpha is opacity. `root` is the file's tree, its tags without namespace.
     """
 
     folder: ModelFolder
@@ -36,8 +36,8 @@ class DaeMaterials:
                 self._elements.setdefault((element.tag, str(element.get("id"))), element)
 
     def dressed(self, faces: DaeFaces, part: str, instance: Any, sides: bool | None = None) -> Primitive:
-        """The faces with the material that an `<instance_material>` gives; with None the one whose id is the faces' symbol.
-        sides: whether the geometry is double-sided, None where only the material may state it.
+        """The faces with the material of an `<instance_material>`; if that is None, the material whose id is the faces' symbol.
+        sides: whether the geometry is double-sided, None if only the material may state it.
         """
         target = faces.symbol if instance is None else str(instance.get("target", "")).removeprefix("#")
         element = self._elements.get(("material", target))
@@ -99,7 +99,7 @@ class DaeMaterials:
 
 
 def is_double_sided(*elements: Any) -> bool | None:
-    """The `<double_sided>` that programs write into an `<extra>` of elements; None where there is none."""
+    """The `<double_sided>` that programs write into an `<extra>` of elements; None if there is none."""
     found = (text for element in elements for text in element.iterfind(".//extra//double_sided"))
     words = [str(one.text or "").strip().lower() for one in found]
     return None if not words else words[0] not in ("0", "false", "0.0")
@@ -139,7 +139,7 @@ class _Profile:
         return next((element for element in found if element is not None), None)
 
     def _numbers(self, name: str, kind: str) -> Sequence[float]:
-        """Numbers of a channel's `kind` (color or float), which may stand in a parameter that it refers to."""
+        """Numbers of a channel's `kind` (color or float), possibly from a parameter that it refers to."""
         channel = self._channel(name)
         if channel is None:
             return ()
@@ -151,12 +151,12 @@ class _Profile:
         return np.nan_to_num(numbers_of(self.folder, value, np.float64)).tolist()
 
     def color(self, name: str) -> tuple[float, float, float, float] | None:
-        """A channel's colour in [0, 1], None where it has none."""
+        """A channel's colour in [0, 1], None if it has none."""
         values = [min(max(float(x), 0.0), 1.0) for x in self._numbers(name, "color")]
         return (values[0], values[1], values[2], values[3] if len(values) > 3 else 1.0) if len(values) >= 3 else None
 
     def number(self, name: str) -> float | None:
-        """A channel's number, None where it has none."""
+        """A channel's number, None if it has none."""
         values = self._numbers(name, "float")
         return float(values[0]) if values else None
 
@@ -172,7 +172,7 @@ class _Profile:
         return min(max(opacity, 0.0), 1.0)
 
     def texture(self, name: str) -> Texture | None:
-        """A channel's texture, None with a warning where its picture cannot be used."""
+        """A channel's texture; None, with a warning, if its picture cannot be used."""
         channel = self._channel(name)
         return None if channel is None else self._texture(channel.find("texture"))
 

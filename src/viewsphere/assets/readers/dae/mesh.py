@@ -1,4 +1,4 @@
-"""The meshes of a COLLADA file: its polygons, with holes, strips and fans, and all that their corners name."""
+"""The meshes of a COLLADA file: polygons, with holes, strips and fans, and the data that their corners refer to."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ from viewsphere.assets.srgb import linear
 
 LINES = frozenset({"lines", "linestrips"})
 WIDEST = 64
-"""Numbers of a row of a source, and indices of a corner, at most: real files have up to 16."""
+"""Greatest number of values in a source's row, and of indices in a corner: real files have up to 16."""
 
 FACES = frozenset({"polylist", "polygons", "triangles", "trifans", "tristrips"})
 
 
 @dataclass(frozen=True, eq=False)
 class DaeFaces:
-    """Triangles (T, 3) of one material `symbol`, and what their vertices have; `uvs` by the number of the set, v downwards."""
+    """Triangles (T, 3) of one material `symbol`, and the data of their vertices; `uvs` by set number, v downwards."""
 
     symbol: str
     positions: Float
@@ -37,7 +37,7 @@ class DaeFaces:
     colors: Float | None
     uvs: dict[int, Float]
     vertex: Int
-    """The file's own number of each vertex: what a skin gives weights to."""
+    """The file's own number of each vertex, to which a skin assigns weights."""
 
 
 def read_mesh(folder: ModelFolder, mesh: Any) -> Iterator[DaeFaces]:
@@ -55,7 +55,7 @@ def read_mesh(folder: ModelFolder, mesh: Any) -> Iterator[DaeFaces]:
 
 @dataclass(frozen=True, eq=False)
 class _Input:
-    """Values (N, width) that corners name, and the column of their indices."""
+    """Values (N, width) that corners refer to, and the column of their indices."""
 
     semantic: str
     set: int
@@ -82,7 +82,7 @@ def _inputs(folder: ModelFolder, element: Any, sources: dict[str, Any], shared: 
 
 
 def whole(folder: ModelFolder, element: Any, attribute: str, default: int = 0) -> int:
-    """A whole number of at least 0 in an attribute; `default` where it is missing or empty."""
+    """A whole number of at least 0 in an attribute; `default` if it is missing or empty."""
     text = str(element.get(attribute) or default).strip()
     if not (text.isascii() and text.isdecimal() and len(text) < 12):
         raise folder.error(f"<{element.tag}> has {attribute} {text[:40]!r}: expected a whole number; the file may be damaged")
@@ -94,13 +94,13 @@ def _target(element: Any) -> str:
 
 
 def _values(folder: ModelFolder, source: Any) -> Float:
-    """The rows that a source's accessor takes from its array."""
+    """The rows that a source's accessor selects from its array."""
     array, accessor = source.find("float_array"), source.find("technique_common/accessor")
     numbers = numbers_of(folder, array, np.float64)
     params = [] if accessor is None else accessor.findall("param")
     stride = 3 if accessor is None else whole(folder, accessor, "stride", 1)
     offset = 0 if accessor is None else whole(folder, accessor, "offset")
-    # A column without a name is skipped, but some programs name none.
+    # A column without a name is skipped, unless a program omits all names.
     named = [i for i, param in enumerate(params) if param.get("name")] or list(range(len(params) or stride))
     if not 1 <= stride <= WIDEST or max(named) >= stride:
         raise folder.error(f"the source {str(source.get('id'))[:80]!r} has an accessor that is damaged; export the model again")
@@ -110,13 +110,13 @@ def _values(folder: ModelFolder, source: Any) -> Float:
 
 
 def numbers_of(folder: ModelFolder, element: Any, kind: type[np.generic]) -> NDArray[Any]:
-    """The numbers in an element's text; none where there is no element."""
+    """The numbers in an element's text; empty if there is no element."""
     if element is None or not (element.text or "").strip():
         return np.empty(0, kind)
     text = str(element.text)
     try:
         with warnings.catch_warnings():
-            warnings.simplefilter("error")  # older numpy only warns, and keeps the numbers before a mistake
+            warnings.simplefilter("error")  # older numpy only warns, and keeps the numbers before an error
             return np.fromstring(text, kind, sep=" ")
     except (ValueError, DeprecationWarning):
         wrong = next((word for word in text.split() if not _is_number(word)), text.strip()[:40])
@@ -210,7 +210,7 @@ def _rows(folder: ModelFolder, p: Any, width: int) -> Int:
 
 
 def _split(folder: ModelFolder, runs: Sequence[Int], counts: Int) -> tuple[Int, Int]:
-    """The corners without those of polygons of fewer than three."""
+    """The corners and counts without polygons of fewer than three corners."""
     if not runs or not len(counts):
         return np.empty((0, 1), np.int64), np.empty(0, np.int64)
     index = np.concatenate(runs)

@@ -25,9 +25,9 @@ AXES: dict[str, tuple[Axis, Axis]] = {"X_UP": ("+x", "+z"), "Y_UP": ("+y", "+z")
 
 
 def read_dae(folder: ModelFolder) -> tuple[Mesh, FileFacts]:
-    """The file as one mesh with the scene's transforms applied; each element of faces of each instance is a part.
+    """The file as one mesh with the scene's transforms applied; each face element of each instance is a part.
 
-    Vertex colours are taken as sRGB. Without normals, edges are smooth up to a crease. Raises ModelError.
+    Vertex colours are read as sRGB. Without normals, edges are smooth up to a crease. Raises ModelError.
     """
     data = folder.read_model()
     root = parse_xml(folder, data)
@@ -70,7 +70,7 @@ class _Scene:
                 self._elements.setdefault((element.tag, str(element.get("id"))), element)
 
     def pieces(self) -> Iterator[Primitive]:
-        """Return all faces of the scene where its nodes put them; of a file without a scene each geometry once."""
+        """Yield all faces of the scene at the poses of its nodes; for a file without a scene, each geometry once."""
         instance = self.root.find("scene/instance_visual_scene")
         scene = None if instance is None else self._target("visual_scene", instance)
         if scene is None:
@@ -150,7 +150,7 @@ class _Scene:
 
 
 def _matrix(folder: ModelFolder, node: Any) -> Float:
-    """The product (4, 4) of a node's transforms, in their order."""
+    """The product (4, 4) of a node's transforms, in order."""
     matrix = np.eye(4)
     for element in node:
         if element.tag in SIZES:
@@ -164,7 +164,7 @@ def _matrix(folder: ModelFolder, node: Any) -> Float:
 
 
 SIZES = {"matrix": 16, "translate": 3, "scale": 3, "rotate": 4, "lookat": 9}
-"""Transforms of a node, and how many numbers each holds."""
+"""Transforms of a node, and the count of numbers in each."""
 
 
 def _transform(tag: str, values: Float) -> Float:
@@ -194,7 +194,7 @@ def _rotation(axis: Float, angle: float) -> Float:
 
 
 def _looking(eye: Float, interest: Float, up: Float) -> Float:
-    """The pose (3, 4) of what stands at `eye` and looks along its own -z."""
+    """The pose (3, 4) of an object at `eye` that looks towards `interest` along its own -z."""
     back = eye - interest
     back = back / (math.sqrt(float((back * back).sum())) or 1.0)
     side = np.cross(up, back)

@@ -1,4 +1,4 @@
-"""Animations of a glTF file: their frames, and where nodes are at an instant of one.
+"""Animations of a glTF file: their frames, and the node poses at an instant.
 
 https://registry.khronos.org/glTF/specs/2.0/glTF-2.0.html#animations
 """
@@ -17,24 +17,26 @@ from viewsphere.assets.readers.gltf.field import Field
 from viewsphere.geometry.rotation import slerp
 
 Posed = Mapping[int, Mapping[str, Float]]
-"""Of each node that moves its translation, rotation (x, y, z, w), scale and weights, as far as they do."""
+"""The animated properties of each moving node: translation, rotation (x, y, z, w), scale and weights."""
 
 WIDTHS = {"translation": 3, "rotation": 4, "scale": 3, "weights": 1}
 
 DEFAULT = 24.0
-"""Frames a second of a file whose keys are at no even times, as Blender takes it."""
+"""Frame rate of a file whose keys fit no regular rate, Blender's default."""
 
 USUAL = (24.0, 25.0, 30.0, 50.0, 60.0, 24000 / 1001, 30000 / 1001, 60000 / 1001, 48.0, 90.0, 100.0, 120.0)
-"""Rates that animations are sampled at, the likeliest first."""
+"""Usual frame rates of animations, the likeliest first."""
 
 NEAR = 2e-3
-"""Frames by which a time may miss a frame: files hold their times in single precision."""
+"""Greatest deviation of a key's time from a frame, in frames: files store times in single precision."""
 
 LEAST, MOST = 1.0, 1000.0
 
 
 def rate_of(document: Document) -> float:
-    """The likeliest rate that has a frame at every key of the file, else that of the closest keys if it fits all, else 24."""
+    """The likeliest rate with a frame at every key of the file. If none fits, the rate of the closest keys if it fits all keys,
+    else 24.
+    """
     times = sorted(set(chain.from_iterable(_times(document, one).tolist() for one in document.root.items("animations"))))
     steps = [after - before for before, after in pairwise(times) if after - before > 1 / MOST]
     rates = (*USUAL, 1 / min(steps)) if steps else ()
@@ -42,8 +44,8 @@ def rate_of(document: Document) -> float:
 
 
 def timeline(document: Document, clip: str | None, fps: float | None) -> dict[str, Any]:
-    """First and last frame while `clip` plays (None: of what moves each node first), frames a second, whether anything moves,
-    and the `clips` with their first and last frames, as plain data. `fps` None: `rate_of` the file.
+    """First and last frame of `clip` (None: each node's first animation), frame rate, whether anything moves, and the `clips`
+    with their first and last frames, as plain data. Without `fps`, the rate is `rate_of` the file.
 
     Raises ModelError for a clip that the file does not have.
     """
@@ -61,9 +63,9 @@ def timeline(document: Document, clip: str | None, fps: float | None) -> dict[st
 
 
 def posed(document: Document, clip: str | None, seconds: float) -> Posed:
-    """Return the poses of an animation's nodes so many seconds after its beginning. Before its first key and after its last,
-    the pose is that of the key. Without `clip` each node plays the first animation that moves it. Raises ModelError as
-    `timeline` does.
+    """Return the poses of an animation's nodes this many seconds after its start. Before the first key and after the last, the
+    pose of that key applies. Without `clip` each node plays the first animation that moves it. Raises ModelError as `timeline`
+    does.
     """
     nodes: dict[int, dict[str, Float]] = {}
     for animation, channel, target in _channels(document, clip):
@@ -75,7 +77,7 @@ def posed(document: Document, clip: str | None, seconds: float) -> Posed:
 
 
 def _animations(document: Document) -> dict[str, Field]:
-    """The animations by their names; those without one are numbered."""
+    """The animations by their names; unnamed ones are numbered."""
     return {one.text("name") or f"animation{i}": one for i, one in enumerate(document.root.items("animations"))}
 
 
@@ -116,7 +118,7 @@ def _fits(times: Sequence[float], rate: float) -> bool:
 
 
 def _sampled(document: Document, sampler: Field, path: str, seconds: float) -> Float:
-    """The value of one sampler: of a rotation (4,), of weights as many as there are, else (3,)."""
+    """The value of one sampler: (4,) for a rotation, one number per weight for weights, else (3,)."""
     times = _column(document, sampler.integer("input"))
     values = document.accessor(sampler.integer("output"), (WIDTHS[path],)).astype(np.float64)
     kind = sampler.text("interpolation", "LINEAR")
@@ -144,7 +146,7 @@ def _unit(quaternion: Float) -> Float:
 
 
 def _cubic(start: Float, end: Float, t: float, length: float) -> Float:
-    """Between two keys, (in-tangent, value, out-tangent) each (appendix C of the specification)."""
+    """Cubic spline interpolation between two keys, each (in-tangent, value, out-tangent); appendix C of the specification."""
     t2, t3 = t * t, t * t * t
     return (
         (2 * t3 - 3 * t2 + 1) * start[1]

@@ -33,7 +33,7 @@ def is_readable(extension: str) -> bool:
 
 
 def lacking(folder: ModelFolder, extension: str) -> ModelError:
-    """The error for a file whose data only an absent package decodes."""
+    """The error for a file whose data needs a package that is not installed."""
     return folder.error(
         f"{extension} needs the package {PACKAGES[extension]}, which is not installed: pip install 'viewsphere[gltf]', or "
         "export the model without compression"
@@ -50,7 +50,7 @@ def meshopt_of(view: Field) -> tuple[str, Field] | None:
 
 
 def unpacked_view(document: Document, extension: str, fields: Field) -> bytes:
-    """The plain bytes of a bufferView that meshoptimizer has compressed."""
+    """The plain bytes of a bufferView compressed by meshoptimizer."""
     folder = document.folder
     if not is_readable(extension):
         raise lacking(folder, extension)
@@ -72,7 +72,7 @@ def unpacked_view(document: Document, extension: str, fields: Field) -> bytes:
 
 
 def unpacked_primitive(document: Document, primitive: Field, fields: Field) -> dict[int, NDArray[Any]]:
-    """The elements of each accessor of a primitive that Draco has compressed, by the accessor's number."""
+    """The elements of each accessor of a primitive compressed by Draco, by the accessor's number."""
     folder = document.folder
     data, _ = document.view(fields.integer("bufferView"))
     try:

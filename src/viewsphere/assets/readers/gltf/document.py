@@ -64,7 +64,7 @@ HARMLESS_EXTENSIONS = {
     "KHR_xmp",
     "KHR_xmp_json_ld",
 }
-"""Extensions that change neither the geometry nor what this package keeps of a material."""
+"""Extensions that change neither the geometry nor the material fields that this package reads."""
 
 
 @dataclass(eq=False)
@@ -80,7 +80,7 @@ class Document:
 
     @classmethod
     def read(cls, folder: ModelFolder) -> Document:
-        """Parse the model, GLB or JSON as its first bytes say, and check version and extensions."""
+        """Parse the model, GLB or JSON according to its first bytes, and check version and extensions."""
         data = folder.read_model()
         text, binary = _chunks(folder, data) if data[:4] == b"glTF" else (data, None)
         try:
@@ -96,7 +96,7 @@ class Document:
     def _check_header(self) -> None:
         asset = self.root.get("asset")
         told = asset.mapping()
-        version = str(told.get("minVersion", told.get("version", "missing")))[:20]  # of glTF 1.0 often a number
+        version = str(told.get("minVersion", told.get("version", "missing")))[:20]  # often a number in glTF 1.0
         if version != "2.0" and not (version.startswith("2.") and "minVersion" not in asset):
             raise self.folder.error(f"expected glTF version 2.0, found {version}; export the model as glTF 2.0")
         required = {str(extension.value) for extension in self.root.items("extensionsRequired")}
@@ -105,7 +105,7 @@ class Document:
             raise self.folder.error(f"requires the extension {', '.join(unknown)}, not read here; export without it")
 
     def buffer(self, index: int) -> bytes:
-        """Bytes of a buffer; ModelError when it is missing or shorter than it says."""
+        """Bytes of a buffer; raises ModelError if it is missing or shorter than declared."""
         if index not in self._buffers:
             entry = self.root.at("buffers", index)
             length = entry.integer("byteLength")

@@ -1,4 +1,4 @@
-"""Field: a value in a JSON file that knows where it stands, so that a wrong one is reported by its place."""
+"""Field: a value in a JSON file with its path, so that errors report the position of a wrong value."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ class Field:
     where: str
 
     def fail(self, expected: str) -> ModelError:
-        """The error that says what was expected here."""
+        """The error for this value; `expected` describes a valid one."""
         found = repr(self.value)
         return ModelError(f"{self.where}: expected {expected}, found {found if len(found) < 60 else found[:57] + '...'}")
 
@@ -31,7 +31,7 @@ class Field:
         return cast("dict[str, Any]", self.value)
 
     def get(self, key: str) -> Field:
-        """A member of this object; if it is missing, an empty object."""
+        """A member of this object, or an empty object if it is missing."""
         return Field(self.mapping().get(key, {}), f"{self.where}.{key}")
 
     def extension(self, name: str) -> Field | None:
@@ -40,7 +40,7 @@ class Field:
         return extensions.get(name) if name in extensions else None
 
     def items(self, key: str) -> list[Field]:
-        """Items of a member that is an array; none if the member is missing."""
+        """Items of a member that is an array; empty if the member is missing."""
         value = self.mapping().get(key, [])
         if not isinstance(value, list):
             raise Field(value, f"{self.where}.{key}").fail("an array")

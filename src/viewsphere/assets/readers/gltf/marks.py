@@ -1,4 +1,4 @@
-"""Objects of a glTF file that say what they are to those who are put among them."""
+"""Annotations in a glTF file for the objects placed in its scene."""
 
 from __future__ import annotations
 
@@ -18,7 +18,9 @@ FACES = (4, 5, 6)
 
 
 def read_marks(document: Document, worlds: Mapping[int, Float], parts: Mapping[int, str]) -> tuple[Annotation, ...]:
-    """The marks of nodes in the scene (their matrices and the names of their parts by their numbers), in its axes."""
+    """The annotations of nodes in the scene, in its axes; `worlds` and `parts` are the nodes' matrices and part names by
+    number.
+    """
     nodes = document.root.items("nodes")
     found = ((i, nodes[i], _said(nodes[i])) for i in worlds)
     named = ((i, node, said) for i, node, said in found if kind_of(node.text("name"), said.get(PROPERTY)))
@@ -27,7 +29,7 @@ def read_marks(document: Document, worlds: Mapping[int, Float], parts: Mapping[i
 
 
 def is_line(document: Document, node: Field) -> bool:
-    """Return whether a node is a lane that is drawn by lines alone, which nobody shall see."""
+    """Return whether a node is a lane made only of lines, which must stay invisible."""
     if kind_of(node.text("name"), _said(node).get(PROPERTY)) != LANE or "mesh" not in node:
         return False
     primitives = document.root.at("meshes", node.integer("mesh")).items("primitives")
@@ -55,7 +57,7 @@ def _marker(
 
 
 def _lines(document: Document, node: Field, world: Float) -> tuple[tuple[Point, ...], tuple[Edge, ...]]:
-    """The points of a node's lines where they are, and their edges."""
+    """The points of a node's lines in the scene, and their edges."""
     points, edges = list[Point](), list[Edge]()
     for primitive in document.root.at("meshes", node.integer("mesh")).items("primitives"):
         positions = document.accessor(primitive.get("attributes").integer("POSITION"), (3,)).astype(np.float64)

@@ -1,4 +1,4 @@
-"""Materials of a glTF file, with the extensions that Material keeps."""
+"""Materials of a glTF file, with the extensions that Material supports."""
 
 from __future__ import annotations
 
@@ -20,10 +20,11 @@ IMAGE_EXTENSIONS = ("EXT_texture_webp", "MSFT_texture_dds")
 
 
 def read_materials(document: Document, used: Collection[int]) -> list[Material]:
-    """Return the materials in file order (unused ones plain, but for their sides), then the default of primitives without one.
+    """Return the materials in file order (unused ones plain except for their sidedness), then the default for primitives
+    without one.
 
     Primitives without material are plain white plastic rather than the specification's mirror-like metal, and single-sided as
-    it has them.
+    in the specification.
     """
     reader = _Reader(document)
     entries = document.root.items("materials")
@@ -117,7 +118,7 @@ class _Reader:
         return as_metallic_roughness(self.document.folder, material, look)
 
     def texture(self, parent: Field, key: str) -> Texture | None:
-        """The textureInfo under `key`, None when there is none or its image cannot be used."""
+        """The textureInfo under `key`; None if there is none or its image cannot be used."""
         if key not in parent:
             return None
         info = parent.get(key)
@@ -161,7 +162,7 @@ class _Reader:
         return folder.image(unquote(uri), entry.text("name") or unquote(uri))
 
     def _source(self, texture: Field) -> int | None:
-        """Index of the texture's image; of several the first that can be decoded here."""
+        """Index of the texture's image; if there are several, the first that can be decoded here."""
         basisu = texture.extension(BASISU)
         if basisu is not None and is_readable(BASISU):
             return basisu.integer("source")

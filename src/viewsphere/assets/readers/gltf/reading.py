@@ -1,4 +1,4 @@
-"""glTF 2.0 and GLB: our own reader, because none in Python keeps all of a material.
+"""glTF 2.0 and GLB: our own reader, because no other reader in Python keeps all material fields.
 
 https://registry.khronos.org/glTF/specs/2.0/glTF-2.0.html
 """
@@ -21,27 +21,27 @@ from viewsphere.assets.readers.shared.named_points import NamedPoint, named_poin
 from viewsphere.model.annotations.keypoints import Keypoints
 
 PREFIX = "keypoint:"
-"""Begins the name of a node that is a point; the rest is the point's name."""
+"""The prefix of the name of a node that is a point; the rest is the point's name."""
 
 EXTRA = "keypoint"
-"""The member of a node's `extras` that makes it a point: its name, or true for that of the node."""
+"""The member of a node's `extras` that makes it a point: its name, or true for the node's name."""
 
 
 def read_gltf(folder: ModelFolder) -> tuple[Mesh, FileFacts]:
-    """The file's default scene as one mesh in glTF's axes (up +Y, front +Z, metres), at rest; or what is below the first node
-    that is named `folder.node`, in that node's axes.
+    """The file's default scene as one mesh in glTF's axes (up +Y, front +Z, metres), at rest; or only the nodes below the first
+    node named `folder.node`, in that node's axes.
 
-    Skins stand in their bind pose with the scene's joints, morph targets at their default weights, instances
-    are repeated. One part a node, named by the node or its mesh; points as `_read_keypoints` has them. Raises ModelError
-    for a file that breaks the specification in a way that affects the mesh, or requires an extension that this reader lacks.
+    Skins are bent by the scene's joints, morph targets have their default weights, and instances are repeated. Each node is one
+    part, named after the node or its mesh; points are from `_read_keypoints`. Raises ModelError for a file that breaks the
+    specification in a way that affects the mesh, or requires an extension that this reader lacks.
     """
     return _built(Document.read(folder), folder.node, {})
 
 
 def read_gltf_frames(folder: ModelFolder, frames: Sequence[int]) -> Iterator[tuple[Mesh, FileFacts]]:
-    """The file as `read_gltf` gives it at the first frame of the animation that `folder.clip` names (None: of what moves each
-    node first), then at each of the `frames`, of which `folder.fps` make a second. Raises ModelError as there, and for
-    a clip that the file does not have.
+    """The file, as from `read_gltf`, at the first frame of the animation `folder.clip` (None: each node's first animation),
+    then at each of the `frames`, at `folder.fps` per second. Raises ModelError like `read_gltf`, and for a clip that the file
+    does not have.
     """
     document = Document.read(folder)
     line = timeline(document, folder.clip, folder.fps)
@@ -70,8 +70,8 @@ def _built(document: Document, node: str | None, now: Posed) -> tuple[Mesh, File
 def _read_keypoints(document: Document, worlds: Mapping[int, Float]) -> Keypoints | None:
     """Named points among nodes in the scene (their matrices by their numbers, parents first), in its axes; None without any.
 
-    Points are nodes named `keypoint:nose`, or with `extras: {keypoint: nose}`; without any, all joints of skins. A line of the
-    skeleton leads from each to the next one above it; left and right follow from the names.
+    Points are nodes named `keypoint:nose`, or with `extras: {keypoint: nose}`; without any, all joints of skins. A skeleton
+    line connects each point to the next one above it; left and right follow from the names.
     """
     nodes = document.root.items("nodes")
     names = {i: name for i in worlds if (name := _said(nodes[i].mapping()))}
@@ -86,7 +86,7 @@ def _read_keypoints(document: Document, worlds: Mapping[int, Float]) -> Keypoint
 
 
 def _said(node: Mapping[str, Any]) -> str:
-    """The point that a node is said to be; empty for any other."""
+    """The name of the point that a node represents; empty for any other node."""
     name, extras = str(node.get("name", "")), node.get("extras")
     said = cast("dict[str, Any]", extras).get(EXTRA) if isinstance(extras, dict) else None
     if said and not isinstance(said, str):
@@ -103,6 +103,6 @@ def _above(node: int, parents: Mapping[int, int], chosen: Collection[int]) -> in
 
 
 def _numbers(value: Any) -> list[int]:
-    """Whole numbers of a list that has been checked where meshes were read."""
+    """Whole numbers of a list that was already checked when meshes were read."""
     values = cast("list[Any]", value) if isinstance(value, list) else []
     return [int(v) for v in values if isinstance(v, (int, float)) and not isinstance(v, bool)]

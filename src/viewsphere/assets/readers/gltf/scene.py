@@ -25,10 +25,10 @@ TRIANGLES, STRIP, FAN = 4, 5, 6
 
 
 def read_pieces(document: Document, worlds: Mapping[int, Float], now: Posed = MappingProxyType({})) -> list[Primitive]:
-    """The triangles of nodes, whose `worlds` are as `world_matrices` gives them, node by node, transforms applied. What an
-    animation makes of nodes `now` takes the place of what they say.
+    """The triangles of nodes, node by node, with the transforms `worlds` from `world_matrices` applied. The animated properties
+    `now` override those of the nodes.
 
-    What is scaled to nothing is not drawn (glTF 2.0, section 3.5.3).
+    Nodes scaled to zero are not drawn (glTF 2.0, section 3.5.3).
     """
     pieces: list[Primitive] = []
     parts = part_names(document, worlds)
@@ -56,7 +56,7 @@ def read_pieces(document: Document, worlds: Mapping[int, Float], now: Posed = Ma
 
 
 def part_names(document: Document, worlds: Mapping[int, Float]) -> dict[int, str]:
-    """The name of each node's part of the mesh, by the node's number; none for nodes that draw nothing or are hidden."""
+    """The name of each node's part of the mesh, by the node's number; nodes that draw nothing or are hidden are left out."""
     names, taken = dict[int, str](), dict[str, int]()
     hidden = _hidden(document, worlds)
     for index, world in worlds.items():
@@ -90,8 +90,8 @@ def _unused(name: str, taken: dict[str, int]) -> str:
 
 
 def world_matrices(document: Document, below: str | None = None, now: Posed = MappingProxyType({})) -> dict[int, Float]:
-    """Node-to-world matrices (4, 4) of the default scene, parents first, in file order; or those of what is `below` a node of a
-    name, which is the world then. What an animation makes of nodes `now` takes the place of what they say.
+    """Node-to-world matrices (4, 4) of the default scene, parents first, in file order; or only those of nodes `below` the node
+    of this name, whose axes are then the world. The animated properties `now` override those of the nodes.
     """
     root = document.root
     nodes = root.items("nodes")
@@ -116,7 +116,7 @@ def world_matrices(document: Document, below: str | None = None, now: Posed = Ma
 
 
 def _named(document: Document, name: str) -> Field:
-    """The first node of a name."""
+    """The first node of this name."""
     for node in document.root.items("nodes"):
         if node.text("name") == name:
             return node
@@ -224,7 +224,7 @@ def _skin(document: Document, node: Field, worlds: Mapping[int, Float]) -> _Skin
 
 
 def _names(document: Document, joints: Sequence[int]) -> tuple[str, ...]:
-    """Names of nodes, each another."""
+    """Names of nodes, made unique."""
     taken = dict[str, int]()
     said = ((joint, document.root.at("nodes", joint).text("name").strip()) for joint in joints)
     return tuple(_unused(name if is_name(name) else f"node{joint}", taken) for joint, name in said)

@@ -1,6 +1,6 @@
 """KHR_materials_pbrSpecularGlossiness as metallic-roughness, texel by texel.
 
-The mathematics is that of the extension's own examples:
+The formulas are from the extension's own examples:
 https://github.com/KhronosGroup/glTF/tree/main/extensions/2.0/Archived/KHR_materials_pbrSpecularGlossiness
 """
 
@@ -40,10 +40,10 @@ class SpecularGlossiness:
 
 
 def as_metallic_roughness(folder: ModelFolder, material: Material, look: SpecularGlossiness) -> Material:
-    """The material with the fields of metallic-roughness that look most alike.
+    """The material with the metallic-roughness fields of the most similar appearance.
 
-    Textures become two new ones, of the larger one's size. Where both exist but lie differently on the surface, the
-    specular-glossiness texture counts by its mean, with a warning.
+    Textures become two new ones, of the larger one's size. If both exist with different mappings, the mean of the
+    specular-glossiness texture is used, with a warning.
     """
     if look.diffuse_texture is not None and look.texture is not None and not _lie_alike(look.diffuse_texture, look.texture):
         folder.warn(
@@ -153,6 +153,6 @@ def _colors(texels: Bytes | None, factor: tuple[float, ...], count: int) -> Floa
 
 
 def _enlarged(pixels: Bytes, height: int, width: int) -> Bytes:
-    """The picture at another size, each texel the nearest one."""
+    """The picture at another size, by nearest-neighbour sampling."""
     rows, columns = (np.arange(n) * have // n for n, have in zip((height, width), pixels.shape[:2], strict=True))
     return pixels if pixels.shape[:2] == (height, width) else pixels[rows[:, None], columns]

@@ -23,16 +23,16 @@ OPTION_ARGUMENTS = {"-mm": 2, **dict.fromkeys(SCALAR_OPTIONS, 1)}
 VECTOR_OPTIONS = ("-o", "-s", "-t")
 
 MAPS = ("map_", "bump", "norm", "disp", "decal", "refl")
-"""Beginnings of statements that name pictures."""
+"""Prefixes of statements that name pictures."""
 
 READ = {
     "map_kd", "map_ks", "map_ns", "map_ke", "map_d", "map_opacity", "map_tr", "map_bump", "bump", "norm", "map_kn", "map_pr",
     "map_pm", "map_aat",
 }  # fmt: skip
-"""Statements of pictures that are read, and `map_aat`, a switch."""
+"""Picture statements that are read, and `map_aat`, a switch."""
 
 MOST_SHINY = 1000.0
-"""`Ns` of a white texel where only a map is given: the end of the range that the specification names."""
+"""`Ns` of a white texel if only a map is given: the upper end of the specification's range."""
 
 HEIGHT = 0.01
 """Rise of a height map from black to white for `-bm 1`, in widths of its picture."""
@@ -79,11 +79,11 @@ class LibraryMaterial:
 def read_materials(folder: ModelFolder, libraries: Sequence[Library], wanted: set[str]) -> dict[str, LibraryMaterial]:
     """The wanted materials of these libraries by name; the first definition of a name counts.
 
-    `Kd` multiplies `map_Kd`, except a black one, which many exporters write beside a texture. `Ns` (with `map_Ns`) becomes a
-    roughness whose square is sqrt(2 / (Ns + 2)), the width of a lobe like Blinn and Phong's (Walter et al. 2007), unless `Pr`
-    gives one. A `map_bump` that holds heights becomes a normal map: from black to white it rises by `-bm` hundredths of the
-    picture's width. `d < 1` blends, all others are opaque: whether a texture's alpha or `map_d` cuts out or
-    blends, `alpha.with_alpha_modes` says. All are double-sided, as OBJ has no other.
+    `Kd` multiplies `map_Kd`, except a black one, which many exporters write together with a texture. `Ns` (with `map_Ns`)
+    becomes a roughness whose square is sqrt(2 / (Ns + 2)), the width of a lobe like Blinn and Phong's (Walter et al. 2007),
+    unless `Pr` gives one. A `map_bump` that holds heights becomes a normal map: from black to white it rises by `-bm`
+    hundredths of the picture's width. `d < 1` blends, other materials are opaque; `alpha.with_alpha_modes` decides whether a
+    texture's alpha or `map_d` cuts out or blends. All materials are double-sided, as OBJ has no other kind.
     """
     blocks: dict[str, tuple[dict[str, str], Path]] = {}
     for library in libraries:
@@ -147,7 +147,9 @@ class _Builder:
         )
 
     def opacity(self) -> float:
-        """`d`, else 1 - `Tr`. A lone `Tr 1` is opaque: some exporters write opacity there, none an invisible material."""
+        """`d`, else 1 - `Tr`. `Tr 1` without `d` is opaque: some exporters write opacity there, but none writes invisible
+        materials.
+        """
         transparency = self.number("tr", 0.0)
         return min(max(self.number("d", 1.0 if transparency >= 1.0 else 1.0 - transparency), 0.0), 1.0)
 
@@ -156,12 +158,12 @@ class _Builder:
         return numeric_words(self.block.get(key, ""))
 
     def number(self, key: str, default: float) -> float:
-        """A statement's number; the default, with a warning, where it has none."""
+        """A statement's number; the default, with a warning, if it has none."""
         words = [word for word in self.words(key) if word != "-halo"]
         return self.numbers(key, words[:1], default)[0]
 
     def color(self, key: str, default: tuple[float, float, float]) -> tuple[float, float, float]:
-        """A statement's colour; the default, with a warning, where it has none."""
+        """A statement's colour; the default, with a warning, if it has none."""
         values = self.numbers(key, self.words(key)[:3], -1.0)
         if min(values) < 0:
             return default
@@ -169,7 +171,7 @@ class _Builder:
         return (red, green, blue)
 
     def numbers(self, key: str, words: list[str], default: float) -> list[float]:
-        """The words as numbers; one default for no words, and for words that are no numbers, with a warning."""
+        """The words as numbers; one default if there are no words, or, with a warning, if a word is not a number."""
         values = [value for word in words if (value := number_of(word)) is not None]
         if len(values) < len(words):
             self.folder.warn(f"material {self.name!r}: {key} {' '.join(words)[:40]!r} is no number, not read")
@@ -185,7 +187,7 @@ class _Builder:
         return float((2.0 / (max(self.number("ns", 0.0), 0.0) + 2.0)) ** 0.25)
 
     def shininess_texture(self) -> Texture | None:
-        """A new texture with the roughness of `Ns` times `map_Ns` in its green channel; None where `Pr` gives one."""
+        """A new texture with the roughness of `Ns` times `map_Ns` in its green channel; None if `Pr` gives the roughness."""
         source = None if "pr" in self.block else self.map("map_ns")
         image = self.image(source)
         if source is None or image is None:
@@ -199,7 +201,7 @@ class _Builder:
         return source.texture(self.folder.derived(f"#shininess {image} of {most}", made))
 
     def specular(self) -> float:
-        """A Ks of 0.5 counts as a dielectric's 4 %, because exporters of PBR materials write 0.5; 1 beside a `map_Ks`."""
+        """A Ks of 0.5 counts as a dielectric's 4 %, because exporters of PBR materials write 0.5; with a `map_Ks`, it is 1."""
         if "ks" not in self.block or "pr" in self.block or "pm" in self.block or self.image(self.map("map_ks")) is not None:
             return 1.0
         return min(1.0, 2.0 * max(self.color("ks", (0.5, 0.5, 0.5))))
@@ -219,7 +221,9 @@ class _Builder:
         return source.texture(self.folder.derived(f"#specular {image} of {most}", made))
 
     def map(self, key: str) -> _Map | None:
-        """The statement `key`: options before and behind its file's name, which may hold blanks and what looks like either."""
+        """The statement `key`: options before and after its file's name, which may contain blanks and text that looks like
+        options.
+        """
         if key not in self.block:
             return None
         words, options = _options(self.block[key].split(" "))
@@ -233,7 +237,7 @@ class _Builder:
         return None if source is None else self.folder.image(source.file, source.file, base=self.library)
 
     def plain(self, source: _Map | None) -> Texture | None:
-        """The map's image as it is."""
+        """A texture with the map's image unchanged."""
         image = self.image(source)
         return None if source is None or image is None else source.texture(image)
 
@@ -260,11 +264,13 @@ class _Builder:
         return source.texture(self.folder.derived(key, lambda: self.merged(rough, metal)))
 
     def opacity_map(self) -> _Map | None:
-        """The map of opacity, or that of transparency, as `Tr` is 1 - `d`."""
+        """The map of opacity, or the map of transparency, since `Tr` is 1 - `d`."""
         return self.map("map_d") or self.map("map_opacity") or self.map("map_tr")
 
     def with_opacity(self, color: int | None, opacity: int, *, inverse: bool) -> Image:
-        """An image whose alpha is another's alpha or grey, `inverse` where grey is transparency; white without a colour."""
+        """An image whose alpha is the alpha or grey of the image `opacity`. `inverse`: grey is transparency. White without a
+        colour image.
+        """
         images = self.folder.images
         pixels = images[opacity].pixels
         alpha = _grey(pixels)
@@ -275,7 +281,7 @@ class _Builder:
         return Image(f"{self.name} colour and opacity", pixels)
 
     def merged(self, rough: int | None, metal: int | None) -> Image:
-        """An image with one's grey in green and the other's in blue."""
+        """An image with the grey of `rough` in green and the grey of `metal` in blue."""
         channels = [(index, channel) for index, channel in ((rough, 1), (metal, 2)) if index is not None]
         images = self.folder.images
         shape = images[channels[0][0]].pixels.shape[:2]
@@ -285,7 +291,7 @@ class _Builder:
         return Image(f"{self.name} roughness and metallic", pixels)
 
     def bump(self, source: _Map | None) -> Texture | None:
-        """The normal map of a bump statement, heights turned into normals; None for a height map of a single height."""
+        """The normal map of a bump statement, heights turned into normals; None for a height map with a single height."""
         image = self.image(source)
         if source is None or image is None:
             return None
@@ -313,7 +319,7 @@ def _options(words: list[str]) -> tuple[list[str], dict[str, list[str]]]:
 
 
 def _without_options(text: str) -> tuple[str, dict[str, list[str]]]:
-    """A file's name without a comment and without the options behind it, and these options."""
+    """A file's name without a comment and trailing options, and these options."""
     words = uncommented(text).split(" ")
     places = [i for i, word in enumerate(words) if i and (word in OPTION_ARGUMENTS or word in VECTOR_OPTIONS)]
     if not places:
@@ -344,7 +350,7 @@ def _normals(heights: Pixels, clamp: bool) -> Pixels:
 
 
 def _in_channel(channel: int, values: NDArray[np.float64]) -> Pixels:
-    """A picture (H, W, 4) whose other channels are full; the channel holds values (H, W) in [0, 1]."""
+    """A picture (H, W, 4) with values (H, W) in [0, 1] in this channel and full values in the others."""
     pixels = np.full((*values.shape, 4), 255, np.uint8)
     pixels[..., channel] = np.rint(values * 255)
     return pixels

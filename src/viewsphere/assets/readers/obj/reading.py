@@ -31,9 +31,9 @@ LEFT_OUT = {"l": "line", "p": "point", "curv": "curve", "curv2": "curve", "surf"
 def read_obj(folder: ModelFolder) -> tuple[Mesh, FileFacts]:
     """The file as one mesh: up +Y, front +Z, unit 1 (OBJ has no rule for either).
 
-    Parts are the objects (`o`) if there are several, else the groups (`g`). If normals are missing, edges are
-    smoothed by the file's smoothing groups, or without groups by their angle. Curves, surfaces, lines and points are left out.
-    Numbers are read whole, or refused with their line. Raises ModelError.
+    Parts are the objects (`o`) if there are several, else the groups (`g`). If normals are missing, edges are smoothed by the
+    file's smoothing groups, or without groups by their angle. Curves, surfaces, lines and points are left out. Malformed
+    numbers are refused with their line. Raises ModelError.
     """
     text, libraries = read_texts(folder)
     source = _Source(statements(text))
@@ -72,7 +72,7 @@ class _Source:
     left_out: dict[str, int] = field(default_factory=dict[str, int])
 
     def read(self) -> None:
-        """Sort all statements."""
+        """Collect all statements by kind."""
         state = {"usemtl": 0, "o": 0, "g": 0, "s": 0}
         names = {"usemtl": self.materials, "o": self.objects, "g": self.groups}
         plain = {"v": self.v, "vt": self.vt, "vn": self.vn}
@@ -92,11 +92,11 @@ class _Source:
                 self.leave_out(LEFT_OUT[keyword])
 
     def leave_out(self, what: str) -> None:
-        """Count a thing that is not read."""
+        """Count an element that is not read."""
         self.left_out[what] = self.left_out.get(what, 0) + 1
 
     def where(self, keyword: str, number: int) -> int:
-        """The line of the statement of a kind with this number, from 0."""
+        """The line of the statement of this kind with this number, counted from 0."""
         places = (i for i, line in enumerate(self.lines, 1) if line.partition(" ")[0] == keyword)
         return next(islice(places, number, None))
 
@@ -192,7 +192,7 @@ def _corner_indices(folder: ModelFolder, source: _Source, tokens: list[str], tot
         if column and not total and (indices[:, column] >= 0).any():
             folder.warn(f"faces name {name}s, but the file holds none; they are read without")
             indices[:, column] = -1
-        # A missing position, index 0 and one beyond the last are all outside.
+        # A missing position, index 0 and an index beyond the last are all outside.
         used = indices[:, column] if column == 0 else indices[indices[:, column] >= 0, column]
         wrong = used[(used < 0) | (used >= total)]
         if wrong.size:
@@ -211,7 +211,7 @@ def _without_faces(folder: ModelFolder, source: _Source) -> ModelError:
 
 
 def _vertices(folder: ModelFolder, source: _Source) -> tuple[Float, Float | None]:
-    """Positions (V, 3) and linear colours (V, 4) or None; a fourth number alone is a weight of curves."""
+    """Positions (V, 3) and linear colours (V, 4) or None; a single fourth number is a weight for curves."""
     values = _padded(_rows(folder, source, "v", 3, 6), 6, np.nan)
     given = np.isfinite(values[:, 3:6]).all(axis=1, keepdims=True)
     if any(line.startswith("#MRGB") for line in source.lines):
@@ -224,7 +224,7 @@ def _vertices(folder: ModelFolder, source: _Source) -> tuple[Float, Float | None
 
 
 def _rows(folder: ModelFolder, source: _Source, keyword: str, least: int, width: int) -> Float:
-    """Numbers of each line of a kind, (N, at most `width`), NaN for numbers that a line lacks beyond the `least`."""
+    """Numbers of each line of a kind, (N, at most `width`), NaN for missing numbers beyond the `least`."""
     lines: list[str] = getattr(source, keyword)
     rows = [line.split()[:width] for line in lines]
     most = max(map(len, rows), default=0)
@@ -232,7 +232,7 @@ def _rows(folder: ModelFolder, source: _Source, keyword: str, least: int, width:
         try:
             return np.fromiter((float(token) for row in rows for token in row), np.float64).reshape(-1, max(most, 1))
         except ValueError:
-            pass  # a comment behind numbers, or a word that is no number
+            pass  # a comment after numbers, or a word that is not a number
     values = np.full((len(rows), width), np.nan)
     for row, line in enumerate(lines):
         tokens = numeric_words(line)[:width]
@@ -245,7 +245,7 @@ def _rows(folder: ModelFolder, source: _Source, keyword: str, least: int, width:
 
 
 def _no_number(text: str, keyword: str, least: int) -> str:
-    """Return the reason why a statement's text cannot be read, and the remedy."""
+    """Return the reason why a statement's text cannot be read, and the fix."""
     if re.fullmatch(r"[+-]?\d+,\d+(?:[eE][+-]?\d+)?", text):
         return f"{text!r} has a decimal comma; export the model with decimal points"
     return f"expected {least} or more numbers behind {keyword!r}, found {text[:40]!r}; the file may be truncated or damaged"
@@ -260,8 +260,8 @@ def _padded(values: Float, width: int, empty: float) -> Float:
 def _materials(
     folder: ModelFolder, source: _Source, libraries: list[Library]
 ) -> tuple[list[Material], set[int], dict[str, int]]:
-    """Materials, the indices of those that state their opacity, and the index of each that a face names; the first stands in
-    for unknown ones.
+    """Materials, the indices of those that state their opacity, and the index of each by the name in faces; the first replaces
+    unknown ones.
     """
     materials, stated = [Material(name="default")], set[int]()
     known = read_materials(folder, libraries, set(source.materials) | set(map(uncommented, source.materials)))
@@ -278,7 +278,7 @@ def _materials(
 
 
 def _pieces(whole: Primitive, part: Int, names: list[str], material: Int) -> list[Primitive]:
-    """The whole cut by part and material, in order of the file's first face of each."""
+    """The piece `whole` cut by part and material, in order of the file's first face of each."""
     key = part * (int(material.max()) + 1) + material
     _, first, run = np.unique(key, return_index=True, return_inverse=True)
     rank = np.empty(len(first), np.int64)

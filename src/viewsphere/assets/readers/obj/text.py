@@ -1,4 +1,4 @@
-"""The text of an OBJ file and of its material libraries, in the one encoding in which a program wrote them."""
+"""The text of an OBJ file and of its material libraries, decoded with one common encoding."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ MAP = re.compile(rb"(?mi)^[ \t]*(?:map_\w+|bump|norm|disp|decal|refl)[ \t]+(.*?)
 
 @dataclass(frozen=True)
 class Library:
-    """The text of a material library, and its folder, from which the names of its pictures count."""
+    """The text of a material library, and its folder, to which the names of its pictures are relative."""
 
     text: str
     folder: Path
@@ -32,7 +32,7 @@ class _File:
 def read_texts(folder: ModelFolder) -> tuple[str, list[Library]]:
     """The model's text and its libraries; a library that cannot be read is a warning.
 
-    Where faces use materials and no library is named, or none can be read, it is `<name>.mtl` beside the model.
+    If faces use materials and no library is named or readable, the library is `<name>.mtl` beside the model.
     """
     model = _File(folder.model, folder.read_model())
     text = decode(model.data) if (own_encoding(model.data) or "").startswith("utf-16") else None
@@ -43,7 +43,7 @@ def read_texts(folder: ModelFolder) -> tuple[str, list[Library]]:
 
 
 def _libraries(folder: ModelFolder, data: bytes) -> list[_File]:
-    """The libraries that the model names, else the one beside it."""
+    """The libraries that the model names, else the library beside it."""
     lines = list(dict.fromkeys(LIBRARY.findall(data)))
     problems: list[str] = []
     files = [file for line in lines for file in _named(folder, line, problems)]
@@ -55,7 +55,7 @@ def _libraries(folder: ModelFolder, data: bytes) -> list[_File]:
 
 
 def _named(folder: ModelFolder, line: bytes, problems: list[str]) -> list[_File]:
-    """The libraries of an mtllib line: one file whose name may hold blanks, or several without."""
+    """The libraries of an mtllib line: one file whose name may contain blanks, or several whose names do not."""
     names = [name for name in _spellings(folder, line) if folder.finder.holds(name)]
     whole = names[0] if names else decode(line)
     several = [whole] if names else uncommented(whole).split()
@@ -70,14 +70,14 @@ def _named(folder: ModelFolder, line: bytes, problems: list[str]) -> list[_File]
 
 
 def _spellings(folder: ModelFolder, line: bytes) -> Iterator[str]:
-    """The name with and without what looks like a comment, in each encoding that may be meant."""
+    """The name with and without an apparent comment, in each possible encoding."""
     for encoding in (own_encoding(line),) if own_encoding(line) else likely([line]):
         name = decode(line, encoding)
         yield from dict.fromkeys((name, uncommented(name)))
 
 
 def _beside(folder: ModelFolder, problems: list[str]) -> list[_File]:
-    """The library that bears the model's name, with a warning that says why it was read."""
+    """The library with the model's name, with a warning that gives the reason for reading it."""
     for name in (f"{folder.model.stem}.mtl", f"{folder.model.name}.mtl"):
         if folder.finder.holds(name):
             reason = problems[0] if problems else "no mtllib line names a material library"
@@ -90,7 +90,9 @@ def _beside(folder: ModelFolder, problems: list[str]) -> list[_File]:
 
 
 def _encoding(folder: ModelFolder, files: Sequence[_File]) -> str | None:
-    """The encoding of those files that show none: of the likely ones the first that spells most names of files that exist."""
+    """The encoding of the files without a visible one: the likely encoding that yields the most names of existing files, the
+    first one if several do.
+    """
     foreign = [file for file in files if own_encoding(file.data) is None]
     if not foreign:
         return None

@@ -29,7 +29,7 @@ COMMENT = re.compile(rb"#[^\r\n]*")
 def read_off(folder: ModelFolder) -> tuple[Mesh, FileFacts]:
     """The file as one mesh of one part: up +Z, front -Y, unit 1 (OFF has no rule for any).
 
-    Colours, of vertices or of faces, are taken as sRGB. Without normals, edges are smooth up to a crease. Raises ModelError.
+    Colours of vertices or faces are read as sRGB. Without normals, edges are smooth up to a crease. Raises ModelError.
     """
     polygons = _Off.parsed(folder, folder.read_model()).polygons()
     pieces, materials = with_alpha(folder, pieces_of(folder, polygons), [Material(name="default")])
@@ -39,7 +39,7 @@ def read_off(folder: ModelFolder) -> tuple[Mesh, FileFacts]:
 
 @dataclass(frozen=True, eq=False)
 class _Off:
-    """Return all numbers of a file behind its counts, and of each line that holds any its first number and how many."""
+    """All numbers of a file after its counts, and for each line with numbers the index of its first number and their count."""
 
     folder: ModelFolder
     has: dict[str, bool]
@@ -51,7 +51,7 @@ class _Off:
 
     @classmethod
     def parsed(cls, folder: ModelFolder, data: bytes) -> _Off:
-        """The file's numbers, of which there are enough for its promises."""
+        """The file's numbers, checked to be enough for its declared counts."""
         text = COMMENT.sub(b"", data)
         header = HEADER.match(text)
         if header is None and not re.match(rb"\s*\d+\s+\d+(\s+\d+)?\s", text):
@@ -72,7 +72,7 @@ class _Off:
         return cls(folder, has, vertices, faces, numbers, *_lines(rest))
 
     def polygons(self) -> Polygons:
-        """The faces, with what their lines or those of the vertices hold."""
+        """The faces, with the data in their lines and in the vertices' lines."""
         if not self.faces:
             raise self.folder.error(f"holds {self.vertices:,} points and no faces; export a mesh of faces")
         if len(self.starts) < self.vertices + self.faces:
@@ -96,7 +96,7 @@ class _Off:
         )
 
     def _vertex_columns(self) -> list[Float]:
-        """Columns of the vertices' lines, of which all have the same number of numbers."""
+        """Columns of the vertices' lines, which all have the same number of numbers."""
         least = 4 if self.has["4"] else 3
         least += 3 * self.has["N"] + 3 * self.has["C"] + 2 * self.has["ST"]
         widths = self.widths[: self.vertices]
@@ -115,7 +115,7 @@ class _Off:
         return np.column_stack(taken)
 
     def _vertex_colors(self, columns: list[Float]) -> Float | None:
-        """Linear colours of three or four columns; some programs write them behind a header that does not name them."""
+        """Linear colours of three or four columns; some programs write them although the header does not declare them."""
         if len(columns) in (3, 4):
             return linear_colors(columns, brightest_of(columns, None))
         if columns:
@@ -123,7 +123,7 @@ class _Off:
         return None
 
     def _faces(self) -> tuple[Int, Int, Float | None]:
-        """Corners of all faces, how many each has, and colours of those that give any, white for the others."""
+        """Corners of all faces, their number per face, and the faces' colours, white for faces without one."""
         starts = self.starts[self.vertices :][: self.faces]
         widths = self.widths[self.vertices :][: self.faces]
         counts = self.numbers[starts].astype(np.int64)
@@ -153,7 +153,7 @@ class _Off:
 
 
 def _lines(text: bytes) -> tuple[Int, Int]:
-    """For each line that holds any numbers the place of its first among all numbers, and how many it holds."""
+    """For each line with numbers, the index of its first number among all numbers, and their count."""
     octets = np.frombuffer(text, np.uint8)
     is_blank = octets <= 32
     begins = ~is_blank

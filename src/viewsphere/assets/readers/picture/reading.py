@@ -11,12 +11,12 @@ from viewsphere.assets.primitive import FileFacts, Primitive, assemble
 
 
 def read_picture(folder: ModelFolder) -> tuple[Mesh, FileFacts]:
-    """A rectangle in the XZ plane that faces -Y, stands on z = 0 with its centre at x = 0, is 1 unit high and as wide
-    as the picture's proportions ask.
+    """A rectangle in the XZ plane that faces -Y, stands on z = 0 with its centre at x = 0, is 1 unit high and has the picture's
+    proportions.
 
     A picture of more than `SHARPEST` texels a side is reduced by a whole factor. Its back shows the picture mirrored. A
-    photograph is turned as its camera says. Clear texels cut holes (MASK) or, if many texels are partly clear, blend
-    (BLEND), as `alpha.with_alpha_modes` finds. Raises ModelError when the file is no picture or beyond `limits`.
+    photograph is rotated by its EXIF orientation. Clear texels cut holes (MASK) or, if many texels are partly clear, blend
+    (BLEND), as `alpha.with_alpha_modes` decides. Raises ModelError if the file is not a picture or exceeds `limits`.
     """
     data = folder.read_model()
     try:

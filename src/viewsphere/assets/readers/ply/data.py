@@ -29,12 +29,12 @@ COMMENT = re.compile(rb"(?m)^[ \t]*(?:comment|obj_info)\b[^\r\n]*")
 """Some programs write comments between rows, too."""
 
 MAX_HEADER = 1 << 20
-"""Bytes in which a header ends: the longest known have a few thousand."""
+"""Greatest length of a header in bytes: the longest known ones have a few thousand."""
 
 
 @dataclass(frozen=True)
 class Property:
-    """A column of an element: its type, and that of the number before each list; None for single numbers."""
+    """A column of an element: its type, and the type of the count before each list; None for single numbers."""
 
     name: str
     type: str
@@ -43,7 +43,7 @@ class Property:
 
 @dataclass(frozen=True)
 class Element:
-    """A table of a file."""
+    """An element of a file: a table with a name, rows and columns."""
 
     name: str
     rows: int
@@ -71,7 +71,9 @@ class PlyFile:
 
 
 def read_elements(folder: ModelFolder, data: bytes) -> PlyFile:
-    """The elements of a PLY file; of two with one name the first. Raises ModelError for files that are none, or damaged."""
+    """The elements of a PLY file; of two with the same name, the first. Raises ModelError for damaged files and other
+    formats.
+    """
     head, body = _split(folder, data)
     order, elements, comments = _header(folder, head)
     if order:
@@ -92,7 +94,7 @@ def _by_name(elements: Sequence[Element]) -> dict[str, Element]:
 def _columns(
     folder: ModelFolder, data: bytes, elements: Sequence[Element], order: str, at: int
 ) -> tuple[dict[str, Columns], int]:
-    """Columns of all elements, and how many bytes are left."""
+    """Columns of all elements, and the number of bytes left."""
     columns: dict[str, Columns] = {}
     for element in elements:
         found, at = _Table(folder, data, element, order).read(at)
@@ -101,15 +103,15 @@ def _columns(
 
 
 def _text_columns(folder: ModelFolder, text: bytes, elements: Sequence[Element], before: int) -> tuple[dict[str, Columns], int]:
-    """As `_columns`, of a text, whose numbers are laid out as a binary file of doubles."""
+    """As `_columns`, for a text, whose numbers are first converted to a binary file of doubles."""
     doubles = [replace(e, properties=tuple(_as_double(p) for p in e.properties)) for e in elements]
     return _columns(folder, numbers_in(folder, text, before).tobytes(), doubles, "<", 0)
 
 
 def _fitting(folder: ModelFolder, text: bytes, elements: Sequence[Element], before: int) -> tuple[bytes, list[Element]]:
-    """A text and its elements without the last numbers of lines that hold more than the header promises.
+    """A text and its elements without the surplus numbers of lines that hold more than the header declares.
 
-    MeshLab once wrote such lines. Columns behind the last list of such an element may be any others, and are left out, too.
+    MeshLab once wrote such lines. In such an element, columns after the last list are unreliable, and are left out, too.
     """
     lines = [(number, words) for number, line in enumerate(text.splitlines(), before + 1) if (words := line.split())]
     if len(lines) != (promised := sum(element.rows for element in elements)):
@@ -124,7 +126,7 @@ def _fitting(folder: ModelFolder, text: bytes, elements: Sequence[Element], befo
 
 
 def _trusted(folder: ModelFolder, element: Element, lines: Sequence[tuple[int, list[bytes]]]) -> Element:
-    """The element with the columns that its lines hold for sure."""
+    """The element with the columns whose positions in its lines are certain."""
     wrong = next(((number, words) for number, words in lines if _width(element, words) != len(words)), None)
     if wrong is None:
         return element
@@ -147,7 +149,7 @@ def _as_double(column: Property) -> Property:
 
 
 def _split(folder: ModelFolder, data: bytes) -> tuple[str, int]:
-    """The header's text, and where the body begins."""
+    """The header's text, and the offset of the body."""
     if not re.match(rb"ply\s", data):
         raise folder.error("expected a PLY file, which begins with 'ply'")
     end = re.compile(rb"[\r\n]end_header[ \t]*(\r\n|\r|\n|$)").search(data, 0, MAX_HEADER)
@@ -175,7 +177,7 @@ def _header(folder: ModelFolder, text: str) -> tuple[str, list[Element], tuple[s
                 elements[-1] = replace(elements[-1], properties=(*elements[-1].properties, _property(words)))
             elif elements:
                 raise ValueError
-            else:  # before any element it can only be a remark
+            else:  # before any element, it can only be a comment
                 folder.warn(f"line {number} of its PLY header is ignored: {line.strip()[:80]!r}")
         except (KeyError, IndexError, ValueError):
             raise folder.error(f"line {number} of its PLY header cannot be read: {line.strip()[:80]!r}") from None
@@ -200,7 +202,7 @@ class _Table:
     order: str
 
     def read(self, at: int) -> tuple[Columns, int]:
-        """The columns, and where the next element begins."""
+        """The columns, and the offset of the next element."""
         if not self.element.properties or not self.element.rows:
             return {}, at
         least = sum(np.dtype(p.count or p.type).itemsize for p in self.element.properties)
@@ -217,7 +219,7 @@ class _Table:
         return np.dtype(self.order + kind)
 
     def _even(self, at: int) -> tuple[Columns, int] | None:
-        """The columns if each list is as long in all rows as in the first; None if not."""
+        """The columns if each list has the same length in all rows; None otherwise."""
         lengths = self._lengths(at)
         fields: list[tuple[str, np.dtype[np.generic], tuple[int, ...]]] = []
         for i, (column, length) in enumerate(zip(self.element.properties, lengths, strict=True)):
@@ -282,9 +284,9 @@ class _Table:
         return sum(self._dtype(p.type).itemsize for p in properties[: properties.index(first)])
 
     def _begins(self, at: int) -> tuple[list[Int], int]:
-        """For each list column the place of each row's list and its length, (rows, 2); and where the rows end.
+        """For each list column, the offset of each row's list and its length, (rows, 2); and the offset of the rows' end.
 
-        Row by row, as a row's place follows from the lengths before it.
+        This runs row by row, since a row's offset follows from the lengths before it.
         """
         steps, skip = [], 0
         for column in self.element.properties:
@@ -297,14 +299,14 @@ class _Table:
                 skip += size
         try:
             at = _walk(self.data, at, self.element.rows, steps, skip)
-        except (struct.error, ValueError, OverflowError):  # a list as long as NaN or infinity
+        except (struct.error, ValueError, OverflowError):  # a list whose length is NaN or infinity
             raise self._truncated() from None
         if at > len(self.data):
             raise self._truncated()
         return [np.column_stack([places, lengths]).astype(np.int64) for *_, places, lengths in steps], at
 
     def _gathered(self, places: Int, counts: Int, kind: np.dtype[np.generic]) -> NDArray[np.generic]:
-        """Values that lie at these places, `counts` of them at each."""
+        """Values at these offsets, `counts` of them at each."""
         before = np.cumsum(counts) - counts
         at = np.repeat(places - before * kind.itemsize, counts) + np.arange(int(counts.sum())) * kind.itemsize
         octets = np.frombuffer(self.data, np.uint8)[at[:, None] + np.arange(kind.itemsize)]
@@ -312,7 +314,7 @@ class _Table:
 
 
 def _walk(data: bytes, at: int, rows: int, steps: Sequence[_Step], tail: int) -> int:
-    """The ends of the rows that begin here; each list's place and length are added to its step."""
+    """The offset of the end of the rows that begin here; each list's offset and length are added to its step."""
     for _ in range(rows):
         for before, unpack, head, size, places, lengths in steps:
             at += before
@@ -327,4 +329,4 @@ def _walk(data: bytes, at: int, rows: int, steps: Sequence[_Step], tail: int) ->
 
 
 _Step = tuple[int, Callable[[bytes, int], tuple[Any, ...]], int, int, list[int], list[int]]
-"""A list of a row: bytes before it, what reads its length, bytes of that, bytes of an entry; places and lengths found."""
+"""A list of a row: bytes before it, reader of its length, bytes of the length, bytes of an entry; offsets and lengths found."""

@@ -42,10 +42,10 @@ DEPTHS = {
     "u8": 2.0**64,
     "i8": 2.0**63,
 }
-"""The values that stand for full colour in channels of whole numbers."""
+"""The values of full colour in integer channels, by type."""
 
 LOOKS = re.compile(r"colou?r|rgb|red|green|blue|texcoord|normal")
-"""Names of columns that change how a surface looks: those not read cost a warning."""
+"""Names of columns that affect a surface's appearance: unread ones cause a warning."""
 
 TEXTURE = re.compile(r"texturefile[\s:=]+(.+)", re.IGNORECASE)
 
@@ -53,8 +53,8 @@ TEXTURE = re.compile(r"texturefile[\s:=]+(.+)", re.IGNORECASE)
 def read_ply(folder: ModelFolder) -> tuple[Mesh, FileFacts]:
     """The file as one mesh of one part: up +Z, front -Y, unit 1 (PLY has no rule for any).
 
-    Colours are taken as sRGB; a face's colour counts where vertices have none. Where a picture lies on the surface, it is the
-    surface's colour. Without normals, edges are smooth up to a crease. Raises ModelError.
+    Colours are read as sRGB; a face's colour is used if vertices have none. A picture on the surface replaces these colours.
+    Without normals, edges are smooth up to a crease. Raises ModelError.
     """
     file = _Ply(folder, read_elements(folder, folder.read_model()))
     polygons, materials = file.polygons()
@@ -70,7 +70,7 @@ class _Ply:
     file: PlyFile
 
     def polygons(self) -> tuple[Polygons, list[Material]]:
-        """The faces and strips of the file, and the materials that they name."""
+        """The faces and strips of the file, and the materials that they use."""
         vertex, face = (self.file.columns.get(name, {}) for name in ("vertex", "face"))
         positions = self._rows(vertex, ("x", "y", "z"))
         if positions is None and "vertex" in self.file.elements and not self.file.elements["vertex"].rows:
@@ -114,7 +114,7 @@ class _Ply:
         return self.folder.error(f"holds {count:,} points and no faces (a point cloud); {remedy}")
 
     def _whole(self, values: NDArray[np.generic]) -> Int:
-        """Indices as whole numbers; of text files they arrive as floats."""
+        """Indices as integers; in text files they are read as floats."""
         indices = values.astype(np.int64)
         if values.dtype.kind == "f" and (indices != values).any():
             wrong = values[indices != values][0]
@@ -122,13 +122,13 @@ class _Ply:
         return indices
 
     def _rows(self, columns: Columns, names: Sequence[str]) -> Float | None:
-        """Columns of single numbers side by side; None where any is missing."""
+        """Columns of single numbers side by side; None if any is missing."""
         found = [columns.get(name) for name in names]
         arrays = [column.astype(np.float64) for column in found if isinstance(column, np.ndarray)]
         return np.column_stack(arrays) if len(arrays) == len(names) else None
 
     def _first(self, columns: Columns, sets: Iterable[Sequence[str]], least: int) -> list[Float] | None:
-        """The first of several sets of columns of which at least the first `least` are there."""
+        """The first of several sets of columns that has at least its first `least` columns."""
         for names in sets:
             needed = self._rows(columns, names[:least])
             if needed is not None:
@@ -147,12 +147,12 @@ class _Ply:
             return None
         types = {p.name: p.type for p in self.file.elements[element].properties}
         kind = next(types[names[0]] for names in COLORS if all(name in types for name in names[:3]))
-        if kind == "i1":  # written by programs whose bytes have a sign
+        if kind == "i1":  # written by programs with signed bytes
             channels = [np.where(channel < 0, channel + 256, channel) for channel in channels]
         return linear_colors(channels, brightest_of(channels, DEPTHS.get(kind)))
 
     def _pictures(self, *, has_uv: bool) -> list[Material]:
-        """A material for each picture that the comments name; white where it cannot be used."""
+        """A material for each picture that the comments name; white if it cannot be used."""
         names = [match[1].strip() for comment in self.file.comments if (match := TEXTURE.match(comment))]
         if names and not has_uv:
             self.folder.warn(f"names the picture {names[0][:80]!r} but has no texture coordinates; it is not used")
@@ -162,7 +162,7 @@ class _Ply:
         return [Material(name=f"texture {i}", base_color_texture=texture) for i, texture in enumerate(textures)]
 
     def _wedges(self, face: Columns, counts: Int) -> Float | None:
-        """Texture coordinates of all corners, (C, 2), NaN at faces without; None where the file has none."""
+        """Texture coordinates of all corners, (C, 2), NaN for faces without any; None if the file has none."""
         column = next((c for name in WEDGES if isinstance(c := face.get(name), Lists)), None)
         if column is None or not column.counts.any():
             return None
@@ -177,7 +177,7 @@ class _Ply:
         return uv
 
     def _numbers(self, face: Columns, counts: Int, corner_uv: Float | None, pictures: int) -> Int:
-        """The material of each face: 1 and up for the pictures, 0 for those on which none lies."""
+        """The material of each face: 1 and up for the pictures, 0 for faces without a picture."""
         number = face.get("texnumber")
         given = np.zeros(len(counts), np.int64)
         if isinstance(number, np.ndarray):
@@ -198,7 +198,7 @@ class _Ply:
 
 
 def _coloured_once(folder: ModelFolder, pieces: list[Primitive], materials: Sequence[Material]) -> list[Primitive]:
-    """The pieces without colours below pictures: scans and BOP's models hold a surface's colour in both."""
+    """The pieces without vertex colours if they have a picture: scans and BOP's models store a surface's colour in both."""
     single: list[Primitive] = []
     for piece in pieces:
         is_twice = piece.colors is not None and materials[piece.material].base_color_texture is not None
@@ -209,7 +209,9 @@ def _coloured_once(folder: ModelFolder, pieces: list[Primitive], materials: Sequ
 
 
 def _triangles(indices: Int, counts: Int) -> Int:
-    """Triangles (T, 3) of strips: each list holds several, with -1 between them; those that only turn a strip are left out."""
+    """Triangles (T, 3) of strips: each list holds several, separated by -1. Degenerate triangles, which only turn a strip, are
+    left out.
+    """
     place = np.arange(len(indices))
     starts = np.zeros(len(indices), np.int64)
     starts[np.cumsum(counts)[:-1][counts[1:] > 0]] = np.cumsum(counts)[:-1][counts[1:] > 0]

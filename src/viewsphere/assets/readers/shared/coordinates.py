@@ -1,4 +1,4 @@
-"""Coordinates of a file's vertices: a face at a NaN or infinite one is refused, by the same rule in every format."""
+"""Coordinates of a file's vertices: a face with a NaN or infinite coordinate is refused, by the same rule in every format."""
 
 from __future__ import annotations
 
@@ -22,11 +22,12 @@ def check_coordinates(
     line_of: Callable[[int], int] | None = None,
     corners: int = 0,
 ) -> None:
-    """Raise ModelError that names the first vertex with a NaN or infinite coordinate among `used`, the indices that faces name.
+    """Raise ModelError if a vertex in `used`, the indices in faces, has a NaN or infinite coordinate; the message names the
+    first one.
 
-    Vertices of no face may be anywhere: organised scans mark missing points by NaN. `where` begins the message; `line_of` is
-    the line of a vertex in the file. In formats without shared vertices, `corners` is how many each face has: the message
-    then names the face.
+    Vertices without a face may have any coordinates: organised scans mark missing points by NaN. `where` begins the message;
+    `line_of` returns the line of a vertex in the file. In formats without shared vertices, `corners` is the number per face,
+    and the message names the face.
     """
     if not positions.size or (positions.min() > -GREATEST and positions.max() < GREATEST):  # both are NaN if any number is
         return

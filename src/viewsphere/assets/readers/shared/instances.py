@@ -1,4 +1,4 @@
-"""The number of times that DAE and 3MF files repeat their objects. A few lines of nested references can request billions."""
+"""The number of object instances in DAE and 3MF files, where a few lines of nested references can request billions."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from xml.etree.ElementTree import Element
 from viewsphere.assets.paths.folder import ModelFolder
 
 ENOUGH = 10**12
-"""Counting stops here: more digits would be a message of pages."""
+"""Counting stops here, since more digits would make messages endlessly long."""
 
 
 def count_instances(references: Mapping[str, Sequence[str]], root: str) -> tuple[int | None, int]:
@@ -46,8 +46,8 @@ def check_instances(folder: ModelFolder, references: Mapping[str, Sequence[str]]
 
 
 def dae_references(root: Element) -> dict[str, list[str]]:
-    """For each node of a COLLADA file its child nodes and the nodes it instantiates; the scenes' own parent is `""`."""
-    # Nodes are told apart by their numbers: files in which two have the same id are common.
+    """For each node of a COLLADA file, its child nodes and the nodes that it instantiates; the parent of the scenes is `""`."""
+    # Nodes are identified by number, because files with duplicate ids are common.
     scenes, library = "", "library"
     references: dict[str, list[str]] = {scenes: [], library: []}
     by_url: dict[str, str] = {}

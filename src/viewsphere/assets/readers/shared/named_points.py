@@ -1,4 +1,4 @@
-"""Named points of a model's file, from nodes of a tree."""
+"""Named points of a model's file, from the nodes of its scene tree."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from viewsphere.model.fields.numbers import LARGEST
 
 @dataclass(frozen=True, eq=False)
 class NamedPoint:
-    """A node that is a point: what it is called, where it is (3,), and the number of the next such node above it."""
+    """A node that is a point: its name, its position (3,), and the number of the next such node above it."""
 
     name: str
     place: Float
@@ -22,9 +22,9 @@ class NamedPoint:
 
 
 def named_points(folder: ModelFolder, nodes: Mapping[int, NamedPoint]) -> Keypoints | None:
-    """The points of nodes, by numbers, in their order, with a line to each from the one above, and left and right as the names
-    say; None without any. Names that no point may have, or that are there twice, become others; a file of more points than a
-    model may have gets a warning.
+    """The points of nodes, by number, in their order; None without any. A line connects each point to the one above, and left
+    and right follow from the names. Invalid and duplicate names are changed; a file with too many points for a model causes a
+    warning.
     """
     if len(nodes) > MOST_POINTS:
         folder.warn(f"{len(nodes):,} named points: expected at most {MOST_POINTS:,}, none is kept")

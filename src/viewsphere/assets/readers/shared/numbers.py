@@ -1,4 +1,4 @@
-"""Numbers of text files, read whole or refused with their line."""
+"""Numbers of text files; malformed ones are refused with their line."""
 
 from __future__ import annotations
 
@@ -16,7 +16,9 @@ NO_NUMBER = re.compile(rb"[-+]?(?:nan\S*|1\.#\S+)", re.IGNORECASE)
 
 
 def numbers_in(folder: ModelFolder, text: bytes, lines_before: int) -> Float:
-    """Return all numbers of a text between blanks. Raises ModelError for a word that is none, with its line in the file."""
+    """Return all numbers of a text, separated by blanks. Raises ModelError for a word that is not a number, with its line in
+    the file.
+    """
     for words in (text, None):
         try:
             return _parsed(NO_NUMBER.sub(b"nan", text) if words is None else words)
@@ -31,7 +33,7 @@ def numbers_in(folder: ModelFolder, text: bytes, lines_before: int) -> Float:
 
 def _parsed(text: bytes) -> Float:
     with warnings.catch_warnings():
-        warnings.simplefilter("error")  # older numpy only warns, and keeps the numbers before a mistake
+        warnings.simplefilter("error")  # older numpy only warns, and keeps the numbers before an error
         return np.fromstring(text, np.float64, sep=" ")
 
 

@@ -1,4 +1,4 @@
-"""Polygons to triangles."""
+"""Triangulation of polygons."""
 
 from __future__ import annotations
 
@@ -14,10 +14,9 @@ from viewsphere.assets.readers.shared.transform import unit
 def triangulate(positions: Float, corners: Int, counts: Int) -> tuple[Int, Int]:
     """Cut polygons into triangles, in order.
 
-    `corners` are all polygons' vertices one after another and `counts` (at least 3) how many each has.
-    Returns the triangles (T, 3) as indices into `corners`, n - 2 for each polygon, and the polygon of each
-    (T,). A polygon is cut as a fan; a quadrilateral whose fan would fold is cut along its other diagonal, and
-    a larger one by its ears.
+    `corners` are the vertices of all polygons one after another, and `counts` (at least 3) their number per polygon. Returns
+    the triangles (T, 3) as indices into `corners`, n - 2 for each polygon, and the polygon of each (T,). A polygon is cut as a
+    fan; a quadrilateral whose fan would fold is cut along its other diagonal, and a larger one by its ears.
     """
     starts = np.cumsum(counts) - counts
     owner = np.repeat(np.arange(len(counts)), counts - 2)
@@ -48,7 +47,7 @@ def triangulate(positions: Float, corners: Int, counts: Int) -> tuple[Int, Int]:
 
 
 def _lean(points: Float, triangles: Int, owner: Int, first: Int) -> tuple[Float, Float]:
-    """For each polygon the least component of its triangles' normals along its own, and that normal."""
+    """For each polygon, its normal and the least component of its triangles' normals along that normal."""
     a, b, c = (points[triangles[:, i]] for i in range(3))
     faces = np.cross(b - a, c - a)
     normals = np.add.reduceat(faces, first)
@@ -58,7 +57,7 @@ def _lean(points: Float, triangles: Int, owner: Int, first: Int) -> tuple[Float,
 
 def flattened(points: Float, normal: Float) -> Float | None:
     """The polygon's points (n, 2) in its own plane, counter-clockwise; None if the polygon has no area."""
-    # Neither @ nor the norm of one vector: BLAS, which rounds by processor, does both.
+    # Neither @ nor the norm of one vector is used: both call BLAS, which rounds differently on each processor.
     (z,) = unit(normal[None])
     if not z.any() or not np.isfinite(z).all() or not np.isfinite(points).all():
         return None
@@ -68,10 +67,11 @@ def flattened(points: Float, normal: Float) -> Float | None:
 
 
 def _ears(points: Float) -> Int:
-    """Triangles (n - 2, 3) of a simple polygon (n, 2), counter-clockwise, cut ear by ear; of one that is not simple, any.
+    """Triangles (n - 2, 3) of a simple polygon (n, 2), counter-clockwise, cut ear by ear; for a polygon that is not simple, the
+    triangles are arbitrary.
 
-    Every corner is kept, those on straight edges too, so that the triangles meet those of neighbours without cracks: that, and
-    equal rounding on every processor, are why no library cuts them.
+    Every corner is kept, even on straight edges, so that the triangles meet those of neighbours without cracks. For this, and
+    for equal rounding on every processor, no library is used.
     """
     ring = _Ring(points.tolist())
     triangles: list[tuple[int, int, int]] = []
@@ -92,9 +92,7 @@ Point = tuple[float, float]
 
 
 class _Ring:
-    """The corners of a polygon that are not cut off yet, and the places of those that are not convex: only they may lie in an
-    ear.
-    """
+    """The remaining corners of a polygon, and the positions of the non-convex ones, since only these can be inside an ear."""
 
     def __init__(self, points: Sequence[Point]) -> None:
         count = len(points)
@@ -109,8 +107,8 @@ class _Ring:
                 self._reflex.setdefault(self._place(points[i]), set()).add(i)
 
     def is_ear(self, i: int) -> bool:
-        """Return whether a corner is convex and no other lies in the triangle of it and its neighbours; or it lies on a
-        neighbour.
+        """Return whether a corner is convex and no other corner is in the triangle of it and its neighbours. A corner that
+        coincides with a neighbour is an ear, too.
         """
         a, b, c = (self.points[k] for k in (self.before[i], i, self.after[i]))
         if b in (a, c):
@@ -127,7 +125,7 @@ class _Ring:
         return not any(_holds(a, b, c, self.points[k]) for place in near for k in cells[place])
 
     def cut(self, i: int) -> None:
-        """Take a corner away; its neighbours may become convex."""
+        """Remove a corner; its neighbours may become convex."""
         before, after = self.before[i], self.after[i]
         was_reflex = [k for k in (before, after) if not self._is_convex(k)]
         self.after[before], self.before[after] = after, before
@@ -147,7 +145,7 @@ class _Ring:
         return _turn(*(self.points[k] for k in (self.before[i], i, self.after[i]))) > 0
 
     def _place(self, point: Point) -> tuple[int, int]:
-        """The cell of a grid in which a point lies."""
+        """The cell of a grid that contains a point."""
         return int((point[0] - self._low[0]) / self._cell), int((point[1] - self._low[1]) / self._cell)
 
 
@@ -157,5 +155,5 @@ def _turn(a: Point, b: Point, c: Point) -> float:
 
 
 def _holds(a: Point, b: Point, c: Point, p: Point) -> bool:
-    """Return whether a triangle, its edges too, holds a point that is none of its corners."""
+    """Return whether a triangle, including its edges, contains a point that is not one of its corners."""
     return p not in (a, b, c) and _turn(a, b, p) >= 0 and _turn(b, c, p) >= 0 and _turn(c, a, p) >= 0

@@ -1,4 +1,4 @@
-"""Polygons with holes as polygons without: each hole is joined to the outline by a cut that is walked twice."""
+"""Conversion of polygons with holes to polygons without: a cut, traversed twice, joins each hole to the outline."""
 
 from __future__ import annotations
 
@@ -13,10 +13,11 @@ from viewsphere.assets.readers.shared.polygon import flattened
 
 
 def without_holes(points: Float, rings: Sequence[Int]) -> Int:
-    """One ring (N,) of the corners of an outline, which comes first, and of its holes; `points` (P, 3) are where corners lie.
+    """One ring (N,) of the corners of an outline, the first of `rings`, and of its holes; `points` (P, 3) are the corners'
+    positions.
 
-    The first and the last corner of each cut appear twice. Holes may turn either way. Of an outline without area no hole is
-    joined.
+    The first and the last corner of each cut appear twice. Holes may have either orientation. If the outline has no area, no
+    hole is joined.
     """
     outline, holes = rings[0], [ring for ring in rings[1:] if len(ring) > 2]
     local = points[outline] - points[outline[0]]
@@ -39,7 +40,7 @@ def _clockwise(flat: Float, ring: Int) -> Int:
 
 
 def _joined(flat: Float, ring: Int, hole: Int, holes: Sequence[Int]) -> Int:
-    """The ring with the hole: cut from the hole's corner of the largest x to the nearest corner that it sees."""
+    """The ring with the hole: cut from the hole's corner of the largest x to the nearest visible corner."""
     hole = np.roll(hole, -int(np.argmax(flat[hole, 0])))
     start = flat[hole[0]]
     starts = np.concatenate([ring, *holes])
@@ -52,14 +53,14 @@ def _joined(flat: Float, ring: Int, hole: Int, holes: Sequence[Int]) -> Int:
 
 
 def _opens_to(flat: Float, ring: Int, i: int, point: Float) -> bool:
-    """Return whether a point lies within the angle at a corner of a counter-clockwise ring."""
+    """Return whether a point is within the angle at a corner of a counter-clockwise ring."""
     before, corner, after = (flat[ring[k % len(ring)]] for k in (i - 1, i, i + 1))
     sides = _turn(before, corner, point) > 0, _turn(corner, after, point) > 0
     return bool(all(sides) if _turn(before, corner, after) >= 0 else any(sides))
 
 
 def _is_cut(start: Float, end: Float, firsts: Float, seconds: Float) -> bool:
-    """Return whether the line from start to end meets any of the edges that do not begin or end there too."""
+    """Return whether the line from start to end meets any edge that does not share an endpoint with it."""
     apart = _turn(start, end, firsts) * _turn(start, end, seconds) <= 0
     across = _turn(firsts, seconds, start) * _turn(firsts, seconds, end) <= 0
     shared: NDArray[np.bool_] = np.zeros(len(firsts), bool)

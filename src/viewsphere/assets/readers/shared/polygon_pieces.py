@@ -17,16 +17,17 @@ from viewsphere.assets.srgb import linear
 
 BYTE = 255.0
 BEYOND_ONE = 2.0
-"""Colours of floats run from 0 to 1, of some programs from 0 to 255: above this value they do. Renders of bright light slightly
-exceed 1."""
+"""Float colours with a value above this are in the range 0 to 255, which some programs use, instead of 0 to 1. Renders of
+bright light slightly exceed 1.
+"""
 
 
 @dataclass(frozen=True, eq=False)
 class Polygons:
-    """Polygons one after another: `corners` (C,) are indices of vertices, `counts` (N,) how many each polygon has.
+    """Polygons one after another: `corners` (C,) are indices of vertices, `counts` (N,) their number per polygon.
 
-    Arrays of vertices: `positions`, `normals`, `colors` (linear, with alpha), `uv` (v downwards). `corner_uv` (C, 2) and
-    `face_colors` (N, 4) take the place of `uv` and `colors`. `material` (N,) is each polygon's.
+    Arrays per vertex: `positions`, `normals`, `colors` (linear, with alpha), `uv` (v downwards). `corner_uv` (C, 2) and
+    `face_colors` (N, 4) replace `uv` and `colors`. `material` (N,) is per polygon.
     """
 
     positions: Float
@@ -41,7 +42,7 @@ class Polygons:
 
 
 def pieces_of(folder: ModelFolder, polygons: Polygons) -> list[Primitive]:
-    """A piece for each material, all of one part; normals are smooth up to a crease where the polygons have none."""
+    """A piece for each material, all of one part; normals are smooth up to a crease if the polygons have none."""
     polygons = _whole(folder, polygons)
     if not len(polygons.counts):
         return []
@@ -60,7 +61,7 @@ def pieces_of(folder: ModelFolder, polygons: Polygons) -> list[Primitive]:
 def with_alpha(
     folder: ModelFolder, pieces: Sequence[Primitive], materials: Sequence[Material]
 ) -> tuple[list[Primitive], list[Material]]:
-    """The pieces, and materials that blend where colours are clear; colours that are clear all over count as opaque."""
+    """The pieces, and materials that blend if colours are transparent; completely transparent colours count as opaque."""
     alphas = [piece.colors[:, 3] for piece in pieces if piece.colors is not None and len(piece.colors)]
     if alphas and max(float(alpha.max()) for alpha in alphas) == 0.0:
         folder.warn("all its colours have alpha 0; they are taken as opaque")
@@ -78,7 +79,7 @@ def _opaque(piece: Primitive) -> Primitive:
 
 
 def _piece(polygons: Polygons, cut: Int) -> Primitive:
-    """The triangles as one piece; with values of corners or faces every corner is a vertex of its own."""
+    """The triangles as one piece; with values per corner or face, every corner becomes a separate vertex."""
     is_split = polygons.corner_uv is not None or polygons.face_colors is not None
     at = polygons.corners if is_split else slice(None)
 
@@ -98,7 +99,7 @@ def _piece(polygons: Polygons, cut: Int) -> Primitive:
 
 
 def _whole(folder: ModelFolder, polygons: Polygons) -> Polygons:
-    """The polygons of at least three corners, after a look at what they name."""
+    """The polygons of at least three corners, after a check of their indices."""
     corners, total = polygons.corners, len(polygons.positions)
     if corners.size and (corners.min() < 0 or corners.max() >= total):
         wrong = corners.min() if corners.min() < 0 else corners.max()
@@ -121,15 +122,15 @@ def _whole(folder: ModelFolder, polygons: Polygons) -> Polygons:
 
 
 def linear_colors(channels: Sequence[Float], brightest: float) -> Float:
-    """Linear colours (N, 4) from sRGB channels, three or with alpha four, of which `brightest` stands for 1."""
+    """Linear colours (N, 4) from sRGB channels, three, or four with alpha, in which `brightest` represents 1."""
     unit = [np.clip(np.nan_to_num(channel / brightest), 0.0, 1.0) for channel in channels]
     return np.column_stack([*(linear(channel) for channel in unit[:3]), unit[3] if len(unit) > 3 else np.ones(len(unit[0]))])
 
 
 def brightest_of(channels: Sequence[Float], depth: float | None) -> float:
-    """The value that stands for full colour: `depth`, the greatest of its type, but 255 where nothing exceeds a byte.
+    """The value of full colour: `depth`, the greatest value of its type, or 255 if no value exceeds a byte.
 
-    None for `depth` is a type of floats.
+    `depth` is None for floating-point types.
     """
     most = max((float(np.nanmax(channel, initial=0.0)) for channel in channels), default=0.0)
     if depth is None:
@@ -138,5 +139,5 @@ def brightest_of(channels: Sequence[Float], depth: float | None) -> float:
 
 
 def upright(uv: Float) -> Float:
-    """Texture coordinates with v downwards, as glTF has them, of those whose v runs upwards."""
+    """Texture coordinates with v downwards, as in glTF, from coordinates with v upwards."""
     return np.column_stack([uv[:, 0], 1.0 - uv[:, 1]])

@@ -1,4 +1,4 @@
-"""Proof that the triangles of a polygon cover it: the areas of both are compared."""
+"""A check that the triangles of a polygon cover it, by comparing both areas."""
 
 from __future__ import annotations
 
@@ -10,14 +10,16 @@ from viewsphere.assets.primitive import Float, Int, face_normals
 from viewsphere.assets.readers.shared.polygon import triangulate
 
 FOLDED = 1e-4
-"""Share of a polygon's area by which a triangle may be turned over: float32 rounds thin triangles by about 1e-5."""
+"""Greatest area of flipped triangles, as a share of the polygon's area: float32 rounds thin triangles by about 1e-5."""
 
 BENT = 0.05
-"""Excess of the triangles over the outline's area: that of a square whose halves meet at 36 degrees, nearly a crease."""
+"""Excess of the triangles over the outline's area: a square whose halves meet at 36 degrees, nearly a crease, has this
+excess.
+"""
 
 
 def cut_polygons(folder: ModelFolder, positions: Float, corners: Int, counts: Int) -> tuple[Int, Int]:
-    """The triangles of polygons as `triangulate` returns them; polygons that their triangles do not fill cost a warning."""
+    """The triangles of polygons as `triangulate` returns them; polygons not covered by their triangles cause a warning."""
     triangles, owner = triangulate(positions, corners, counts)
     kept = np.flatnonzero(counts > 3)
     if kept.size:
@@ -41,7 +43,7 @@ def _outline_normals(points: Float, counts: Int) -> Float:
 def _badly_covered(
     points: Float, triangles: Int, owner: Int, counts: Int, outlines: Float
 ) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-    """Polygons with a triangle that is turned over, and others with more area than their outlines, each (N,) bool."""
+    """Masks (N,) of polygons with a flipped triangle, and of other polygons with more area than their outlines."""
     first = np.cumsum(counts - 2) - (counts - 2)
     faces = face_normals(points, triangles)
     area, outline = np.add.reduceat(_lengths(faces), first), _lengths(outlines)

@@ -1,4 +1,4 @@
-"""Shading normals for files that give none."""
+"""Shading normals for files without any."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from viewsphere.assets.primitive import BLOCK, Float, Int, Primitive, blocks, fa
 from viewsphere.assets.readers.shared.transform import unit
 
 CREASE_DEG = 40.0  # cylinders of ten sides, 36 degrees each, are smooth; boxes are not
-MAX_VALENCE = 64  # faces around a point: bounds the time of hostile fans, whose cost grows with the square
+MAX_VALENCE = 64  # faces around a point: limits the time for hostile fans, whose cost grows quadratically
 ROUNDS = 8
-"""More normals than a vertex has where less than a fan of sharp faces meets."""
+"""Rounds of claiming equal normals: more than the number of normals at any vertex except the centre of a fan of sharp faces."""
 
 
 def flat(piece: Primitive) -> Primitive:
@@ -30,7 +30,7 @@ def creased(piece: Primitive, groups: NDArray[np.int64] | None = None) -> Primit
 
     A corner's normal is the mean, weighted by the angles at the corner's point, of the normals of the faces around this point
     that differ from the corner's own face by less than `CREASE_DEG`. With `groups` (T,), one smoothing group a triangle, the
-    faces of the same group count instead, and group 0 is flat. Of more than `MAX_VALENCE` faces around a point only those
+    faces of the same group count instead, and group 0 is flat. If more than `MAX_VALENCE` faces meet at a point, only those
     near in the file's order count.
     """
     return _welded(piece, _corner_normals(piece, groups))
@@ -59,13 +59,13 @@ def _around_points(positions: Float, triangles: Int) -> tuple[Int, Int]:
     """Return all corners, grouped by their point and in the file's order, and the ascending number of each corner's point."""
     point = _same_points(positions)[triangles.reshape(-1)]
     bits = len(point).bit_length()
-    # Plain numbers, of which no two are equal, are sorted in a tenth of the time of a stable argsort.
+    # Sorting plain, distinct numbers takes a tenth of the time of a stable argsort.
     packed = np.sort((point << bits) | np.arange(len(point)))
     return packed & ((1 << bits) - 1), packed >> bits
 
 
 def _parted(point: Int) -> Iterator[slice]:
-    """Runs of some `BLOCK` ascending numbers, equal ones in one run."""
+    """Slices of about `BLOCK` ascending numbers, with equal numbers in one slice."""
     start = 0
     while start < len(point):
         middle = min(start + BLOCK, len(point)) - 1
@@ -78,7 +78,7 @@ def _means(corners: Int, point: Int, directions: Float, angles: Float, groups: N
     """The normals of all corners around some points, whose numbers ascend."""
     owner = corners // 3
     facing = directions[owner]
-    # Angles, not areas: a quadrilateral then counts the same however it was cut.
+    # Angles, not areas: a quadrilateral then has the same weight for either diagonal.
     turned = facing * angles[corners][:, None]
     total = turned.copy()
     first = np.arange(len(corners))
@@ -153,9 +153,10 @@ def _ordered(corners: Int, vertex: Int, bits: NDArray[np.int32]) -> Int:
 
 
 def _first_like(vertex: Int, bits: NDArray[np.int32]) -> Int:
-    """For each corner the first of the same vertex and the same bits (N, 3).
+    """For each corner, the first corner with the same vertex and the same bits (N, 3).
 
-    Round by round each vertex's first corner that is left claims those like it: most have one normal, few more than `ROUNDS`.
+    In each round, the first remaining corner of each vertex claims all equal ones. Most vertices have one normal, few more than
+    `ROUNDS`.
     """
     like, left = np.arange(len(vertex)), np.arange(len(vertex))
     first = np.empty(int(vertex.max(initial=-1)) + 1, np.int64)
@@ -175,7 +176,7 @@ def _first_like(vertex: Int, bits: NDArray[np.int32]) -> Int:
 
 
 def row_numbers(*columns: NDArray[Any]) -> Int:
-    """One number a row, equal for equal rows, in the order of rows: much faster than numpy's unique along an axis."""
+    """One number per row, equal for equal rows, in the sort order of rows: much faster than numpy's unique along an axis."""
     order = np.lexsort(columns[::-1])
     steps = np.zeros(len(order), np.int64)
     for column in columns:
@@ -187,5 +188,5 @@ def row_numbers(*columns: NDArray[Any]) -> Int:
 
 
 def _same_points(positions: Float) -> Int:
-    """One number a vertex, equal for equal positions, (V,) int64."""
+    """One number per vertex, equal for equal positions, (V,) int64."""
     return row_numbers(*positions.T)

@@ -1,4 +1,4 @@
-"""Text model files in whatever encoding they were written."""
+"""Decoding of text model files in any encoding."""
 
 from __future__ import annotations
 
@@ -15,14 +15,16 @@ SAMPLE_BYTES = 1 << 16
 COMMENT = re.compile(r"(?:^|(?<=\s))#")
 COMMENT_BEHIND_NUMBERS = re.compile(r"(?<!1\.)#")
 NO_NUMBER = re.compile(r"[+-]?1\.#\w+|-?nan\(\w+\)")
-"""NaN and infinity as Microsoft's C library writes them."""
+"""NaN and infinity as written by Microsoft's C library."""
 
 EASTERN = ("gb18030", "shift_jis", "euc_kr", "big5", "cp1251", "cp1252")
-"""Encodings that are tried after the guess: those of systems that write model files in no Unicode."""
+"""Encodings tried after the guess, from systems that write model files without Unicode."""
 
 
 def decode(data: bytes, encoding: str | None = None) -> str:
-    """Text of a file: by `own_encoding`, else as `encoding` says, else by the likeliest one; unreadable bytes are replaced."""
+    """Text of a file: decoded by `own_encoding`, else by `encoding`, else by the likeliest encoding; unreadable bytes are
+    replaced.
+    """
     return data.decode(own_encoding(data) or encoding or likely([data])[0], errors="replace")
 
 
@@ -43,7 +45,7 @@ def own_encoding(data: bytes) -> str | None:
 
 
 def likely(texts: Sequence[bytes]) -> tuple[str, ...]:
-    """Encodings of files that show none, the likeliest first, by the lines that are not ASCII."""
+    """Encodings of files without a visible one, the likeliest first, judged by the lines that are not ASCII."""
     from charset_normalizer import from_bytes
 
     lines = (line for data in texts for line in data[: 1 << 24].splitlines() if not line.isascii())
@@ -53,7 +55,7 @@ def likely(texts: Sequence[bytes]) -> tuple[str, ...]:
 
 
 def statements(text: str) -> list[str]:
-    """Statements of an OBJ or MTL file, each at the place of its first line in the file: continued lines are joined and
+    """Statements of an OBJ or MTL file, each at the index of its first line in the file: continued lines are joined and
     followed by empty statements, tabs replaced by blanks, surrounding blanks removed.
     """
     plain = text.replace("\r\n", "\n").replace("\r", "\n").replace("\t", " ")
@@ -73,17 +75,17 @@ def _joined(lines: list[str]) -> list[str]:
 
 
 def uncommented(text: str) -> str:
-    """The text before a comment: a `#` that begins a word, because names and Microsoft's NaN (`1.#QNAN`) hold one."""
+    """The text before a comment: a `#` that begins a word, because names and Microsoft's NaN (`1.#QNAN`) may contain one."""
     return COMMENT.split(text, maxsplit=1)[0].rstrip()
 
 
 def numeric_words(text: str) -> list[str]:
-    """The words of a statement of numbers, before a comment, which may follow without a blank."""
+    """The words of a numeric statement before a comment, which may follow without a blank."""
     return COMMENT_BEHIND_NUMBERS.split(text, maxsplit=1)[0].split()
 
 
 def number_of(word: str) -> float | None:
-    """The number that is the whole word, None for any other word; Python's own underscores (1_000) are none."""
+    """The number if the whole word is one, None otherwise; Python's underscores (1_000) are not accepted."""
     if NO_NUMBER.fullmatch(word):
         return float("nan")
     try:

@@ -14,7 +14,7 @@ def moved(piece: Primitive, matrix: Float) -> Primitive:
     """The piece under an affine matrix (4, 4); the winding of a mirrored piece is reversed to keep its fronts."""
     linear = matrix[:3, :3]
     mirrored = bool(np.linalg.det(linear) < 0)
-    # The cofactor matrix is det times the inverse transpose and exists for flattening matrices too.
+    # The cofactor matrix is det times the inverse transpose, and exists for singular matrices, too.
     cofactor = np.cross(linear[[1, 2, 0]], linear[[2, 0, 1]]) * (-1.0 if mirrored else 1.0)
     positions = transform(matrix, piece.positions)
     normals = None if piece.normals is None else unit(transform(cofactor, piece.normals))

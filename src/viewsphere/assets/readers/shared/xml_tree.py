@@ -1,4 +1,4 @@
-"""XML files as trees, by expat: names without their namespaces, no entities, nothing else read."""
+"""XML files as trees, by expat: names without their namespaces, no entities, no external files."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def parse_xml(folder: ModelFolder, data: bytes, file: str = "") -> Element:
 def _parsed(data: bytes) -> Element:
     try:
         return _tree(expat.ParserCreate(), data)
-    except ValueError:  # an encoding such as Shift JIS: expat reads Unicode's and those of one byte a letter
+    except ValueError:  # an encoding such as Shift JIS: expat reads only Unicode and single-byte encodings
         name = _DECLARED.match(data)
     return _tree(expat.ParserCreate("utf-8"), data.decode(name[1].decode() if name else "utf-8").encode())
 
@@ -62,7 +62,7 @@ def _tree(parser: expat.XMLParserType, data: bytes) -> Element:
 
 
 class _Locals(dict[str, str]):
-    """Names without their prefixes, by the names as they are written: each is cut once."""
+    """A cache of names without their prefixes, by the full names."""
 
     def __missing__(self, name: str) -> str:
         local = self[name] = name.rpartition(":")[2]

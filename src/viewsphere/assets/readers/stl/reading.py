@@ -1,4 +1,4 @@
-"""STL, binary and text: triangles; in text each solid is a part."""
+"""STL, binary and text: triangles; in text files each solid is a part."""
 
 from __future__ import annotations
 
@@ -18,10 +18,12 @@ HEADER = 84
 BOM = b"\xef\xbb\xbf"
 FACET = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
 LOOKED_AT = 1024
-"""First bytes that must hold no NUL in a text: a binary file has some in its count and in its first numbers."""
+"""Number of leading bytes without a NUL in a text file: a binary file has NULs in its count and its first numbers."""
 
 OWN_COLOR = 0x8000
-"""Bit of a facet's attribute. In files of Materialise Magics, whose header says COLOR=, it means: no colour of its own."""
+"""Bit of a facet's attribute. In files of Materialise Magics, whose header says COLOR=, it means that the facet has no colour
+of its own.
+"""
 
 START = re.compile(rb"(?i)\s*(#[^\r\n]*\s+)*solid\b")
 COMMENT = re.compile(rb"(?m)(^|(?<=[ \t]))#.*$")
@@ -34,7 +36,7 @@ VERTEX = re.compile(rb"(?i)\bvertex[ \t]+([^\n]*)")
 def read_stl(folder: ModelFolder) -> tuple[Mesh, FileFacts]:
     """The file's triangles, edges smooth up to a crease. Raises ModelError for a truncated or damaged file.
 
-    Bytes behind the promised facets are ignored. Facet colours are kept where the header announces them (Materialise Magics).
+    Bytes after the declared facets are ignored. Facet colours are kept if the header announces them (Materialise Magics).
     """
     data = folder.read_model()
     pieces = _text_solids(folder, data) if _is_text(data) else [_binary(folder, data)]

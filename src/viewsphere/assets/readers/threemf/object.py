@@ -14,7 +14,7 @@ from viewsphere.assets.primitive import Float, Int
 from viewsphere.assets.readers.shared.coordinates import check_coordinates
 
 NOTHING = -1
-"""Index of a triangle's property that the file leaves out."""
+"""Index of a triangle's property if the file omits it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,14 +79,14 @@ def _triangles(folder: ModelFolder, element: Any, mesh: Any) -> Triangles:
     check_coordinates(folder, positions, corners, f"{where}: ")
     group, index = str(element.get("pid") or ""), element.get("pindex", NOTHING)
     groups = [str(t.get("pid") or group) for t in rows]
-    # A property of the first corner alone is that of all three.
+    # If only the first corner has a property, it applies to all three.
     firsts = [t.get("p1", index) for t in rows]
     properties = [(p, t.get("p2", p), t.get("p3", p)) for p, t in zip(firsts, rows, strict=True)]
     return Triangles(positions, corners, groups, _numbers(folder, properties, np.int64, where))
 
 
 def _numbers(folder: ModelFolder, rows: Sequence[tuple[Any, ...]], kind: type[np.generic], where: str) -> Any:
-    """Rows of three numbers; ModelError where one is missing or malformed."""
+    """Rows of three numbers; raises ModelError if one is missing or malformed."""
     try:
         return np.array(rows, dtype=str).reshape(-1, 3).astype(kind)
     except ValueError as error:
@@ -94,7 +94,7 @@ def _numbers(folder: ModelFolder, rows: Sequence[tuple[Any, ...]], kind: type[np
 
 
 def _matrix(text: str) -> Float:
-    """The transform that its twelve numbers say: rows of a matrix that multiplies from the right."""
+    """The transform from its twelve numbers: rows of a matrix that multiplies from the right."""
     matrix = np.eye(4)
     if text.strip():
         matrix[:3] = np.array(text.split(), dtype=str).astype(np.float64).reshape(4, 3).T

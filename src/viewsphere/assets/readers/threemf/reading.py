@@ -1,6 +1,6 @@
 """3MF (https://3mf.io/spec): the objects of the build, with colours and textures of the materials extension.
 
-Components and build items may lie in other model files of the archive (the production extension's `path`).
+Components and build items may be in other model files of the archive (the production extension's `path`).
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ Key = tuple[str, str]
 
 
 def read_3mf(folder: ModelFolder) -> tuple[Mesh, FileFacts]:
-    """The build's objects where it puts them, each mesh a part; edges are smooth up to a crease. Raises ModelError."""
+    """The build's objects at their poses, with each mesh as a part; edges are smooth up to a crease. Raises ModelError."""
     data = folder.read_model()
     try:
         with zipfile.ZipFile(io.BytesIO(data)) as archive:
@@ -103,7 +103,7 @@ class _Package:
         return root
 
     def items(self) -> list[Part]:
-        """The items of the build; of a file without any, all objects that are no components, with a warning."""
+        """The items of the build; if it has none, all objects that are not components, with a warning."""
         path = self.root
         items = [
             Part.of(item, path) for build in self.model(path) if build.tag == "build" for item in build if item.tag == "item"
@@ -128,7 +128,7 @@ class _Package:
         return found
 
     def check(self, items: list[Part]) -> None:
-        """Refuse cycles and floods of instances before any mesh is copied."""
+        """Refuse cycles and excessive instances before any mesh is copied."""
         references: dict[str, list[str]] = {"": [_name_of(item.key) for item in items]}
         waiting = [item.key for item in items]
         while waiting:

@@ -10,8 +10,8 @@ from viewsphere.assets.readers.usd.library import Usd, UsdGeom, UsdSkel
 
 
 def timeline(folder: ModelFolder) -> dict[str, Any]:
-    """First and last frame of a file, its frames a second, whether anything moves, and its animations, of which USD has none
-    by name.
+    """First and last frame of a file, its frame rate, whether anything moves, and an empty list of animations, since USD has no
+    named ones.
     """
     stage = opened(folder)
     first, last = int(stage.GetStartTimeCode()), int(stage.GetEndTimeCode())

@@ -1,4 +1,4 @@
-"""The layers of a USD file: all are found, and checked to be in the model's folder, before one is composed."""
+"""The layers of a USD file. Before composition, all are found and checked to be in the model's folder."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from viewsphere.errors import ModelError
 from viewsphere.limits import limits
 
 REASON = re.compile(r" : '([^\n]*)")
-"""The message behind the place in USD's source that each of its errors names."""
+"""The message after the source position in each of USD's errors."""
 
 PATH = re.compile(r"@?/\S*/([^/\s]*?)[@:]+")
 
 
 def opened(folder: ModelFolder) -> Any:
-    """The composed stage of a file; a layer that is missing or outside the model's folder costs a warning or is refused."""
+    """The composed stage of a file; a missing layer causes a warning, and a layer outside the model's folder is refused."""
     folder.read_model()
     try:
         _check_layers(folder)
@@ -63,12 +63,12 @@ def _named_by(folder: ModelFolder, name: str) -> list[str]:
 
 
 def _absolute(layer: str, path: str) -> str:
-    """A path that a layer names; where it leads nowhere the library leaves it relative."""
+    """The absolute path of a file that a layer names; the library leaves it relative if the file does not exist."""
     return path if Path(path).is_absolute() else str(_file_of(layer).absolute().parent / path)
 
 
 def _is_readable(folder: ModelFolder, name: str) -> bool:
-    """Return whether a layer is a regular file that may be read; warns or raises where it is not."""
+    """Return whether a layer is a regular file that may be read; warns or raises if it is not."""
     path = _file_of(name)
     is_within = _may_read(folder, path)
     if path.is_absolute() and is_within:
@@ -78,7 +78,7 @@ def _is_readable(folder: ModelFolder, name: str) -> bool:
             raise _outside(folder, name)
         if not path.exists():
             folder.warn(f"layer {name!r} is outside the model's folder, not read; set confined: false to allow")
-        return False  # refused once composed, unless only a variant that is not chosen names it
+        return False  # refused after composition, unless only an unselected variant names it
     if not path.is_file():
         folder.warn(f"layer {name!r} does not exist, or cannot be read")
         return False
@@ -91,7 +91,7 @@ def _outside(folder: ModelFolder, name: str) -> ModelError:
 
 
 def _file_of(name: str) -> Path:
-    """The file of a layer; of one inside an archive the archive."""
+    """The file of a layer; for a layer inside an archive, the archive."""
     return Path(name.partition("[")[0])
 
 
@@ -100,13 +100,13 @@ def _may_read(folder: ModelFolder, path: Path) -> bool:
 
 
 def _reason(error: Exception) -> str:
-    """The library's own first reason, without the places in its source and the file's path."""
+    """The library's first error message, without source positions and the file's path."""
     reasons = REASON.findall(str(error)) or [str(error)]
     return PATH.sub("", " ".join(reasons[0].split()))[:120]
 
 
 def asset_bytes(folder: ModelFolder, path: str) -> bytes | None:
-    """Bytes of a file inside an archive, by its resolved path; None where there is none."""
+    """Bytes of a file inside an archive, by its resolved path; None if there is none."""
     asset = Ar.GetResolver().OpenAsset(Ar.ResolvedPath(path))
     if asset is None or asset.GetSize() > limits.MAX_FILE_BYTES or not _may_read(folder, _file_of(path)):
         return None

@@ -1,4 +1,4 @@
-"""The modules of usd-core, which states no types. Import it only where `pxr` is installed."""
+"""The modules of usd-core, which has no type annotations. Import it only where `pxr` is installed."""
 
 from __future__ import annotations
 

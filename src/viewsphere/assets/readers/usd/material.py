@@ -22,7 +22,7 @@ GREY = 0.18  # and that of diffuseColor
 
 @dataclass(frozen=True)
 class Look:
-    """A material, the primvars that its textures read in order of `texcoord`, and that of its vertex colours."""
+    """A material, the primvars that its textures read in order of `texcoord`, and the primvar of its vertex colours."""
 
     material: Material
     uvs: tuple[str, ...] = ()
@@ -30,7 +30,7 @@ class Look:
 
 
 UNBOUND = Look(Material(name="default"), ("st",), "displayColor")
-"""The material of prims without one: their display colours on white."""
+"""The material for prims without one: white, multiplied by their display colours."""
 
 
 @dataclass(eq=False)

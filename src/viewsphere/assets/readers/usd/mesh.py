@@ -18,7 +18,7 @@ from viewsphere.assets.readers.usd.shapes import polygons_of
 
 PER_CORNER = "faceVarying"
 ROWS = {"constant": "one", "uniform": "face", "vertex": "point", "varying": "point", PER_CORNER: "corner"}
-"""The elements that each interpolation has a value for."""
+"""The kind of element with one value each, by interpolation."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,13 +46,13 @@ class Shape:
     subsets: Sequence[tuple[Any, Int]] = field(default_factory=tuple[Any, ...])
 
     def at_corners(self, name: str, width: int) -> Float | None:
-        """A primvar's value at each corner, (C, width); None where the prim has none of that width."""
+        """A primvar's value at each corner, (C, width); None if the prim has none of that width."""
         kind, values = self.values.get(name, ("", np.zeros((0, 0))))
         return None if values.shape[1:] != (width,) else _spread(kind, values, self.point, self.face)
 
 
 def read_shape(folder: ModelFolder, prim: Any, time: Any) -> Shape | None:
-    """The polygons of a mesh or an implicit shape; None where it has none."""
+    """The polygons of a mesh or an implicit shape; None if it has none."""
     found = _polygons(folder, prim, time)
     if found is None or not len(found[2]):
         return None
@@ -100,7 +100,7 @@ def _polygons(folder: ModelFolder, prim: Any, time: Any) -> tuple[Float, Int, In
 
 
 def _is_kept(mesh: Any, counts: Int, time: Any) -> Any:
-    """Return which faces are polygons and no holes, (F,) bool."""
+    """A mask (F,) of the faces that are polygons and not holes."""
     kept = counts > 2
     holes = _array(mesh.GetHoleIndicesAttr().Get(time), np.int64)
     kept[holes[(holes >= 0) & (holes < len(kept))]] = False
@@ -108,7 +108,7 @@ def _is_kept(mesh: Any, counts: Int, time: Any) -> Any:
 
 
 def _kept_corners(folder: ModelFolder, prim: Any, time: Any) -> Any:
-    """Return which corners of the file belong to kept faces; None where all do."""
+    """A mask of the file's corners that belong to kept faces; None if all do."""
     if not prim.IsA(UsdGeom.Mesh):
         return None
     mesh = UsdGeom.Mesh(prim)
@@ -143,7 +143,7 @@ def _add(values: dict[str, tuple[str, Float]], name: str, value: Any, interpolat
 
 
 def _spread(kind: str, values: Float, point: Int, face: Int) -> Float | None:
-    """Values at corners; None where there are too few."""
+    """Values at corners; None if there are too few."""
     if kind == "one":
         return np.repeat(values[:1], len(point), axis=0)
     rows = {"point": point, "face": face, "corner": np.arange(len(point))}[kind]
@@ -166,7 +166,9 @@ def _array(value: Any, kind: type[np.generic], width: int = 0) -> Any:
 def pieces_of(
     shape: Shape, material: int, uvs: Sequence[str], color: str | None, influences: Influences | None, triangles: Int
 ) -> Primitive:
-    """Some of a shape's triangles; `uvs` are the primvars of their texture coordinates, `color` that of their colours."""
+    """Some of a shape's triangles; `uvs` are the primvars of their texture coordinates, `color` is the primvar of their
+    colours.
+    """
     rows = shape.triangles[triangles]
     coordinates = [_downwards(shape.at_corners(name, 2)) for name in uvs[:2]]
     piece = Primitive(

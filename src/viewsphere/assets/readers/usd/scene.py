@@ -21,16 +21,18 @@ from viewsphere.assets.readers.usd.mesh import Influences, by_material, pieces_o
 from viewsphere.assets.readers.usd.skel import skins_of
 
 KEYPOINT = "keypoint:"
-"""Begins a prim's display name that is a named point; in prim names, which hold no colons, `keypoint_`."""
+"""The prefix of the display name of a prim that is a named point. In prim names, which cannot contain colons, it is
+`keypoint_`.
+"""
 
 LEFT_OUT = ("BasisCurves", "NurbsCurves", "HermiteCurves", "NurbsPatch", "Points", "TetMesh", "Volume")
 
 
 def read_usd(folder: ModelFolder) -> tuple[Mesh, FileFacts]:
-    """The file as a render at its first frame shows it, in its own axes and unit; each mesh is a part.
+    """The file as rendered at its first frame, in its own axes and unit; each mesh is a part.
 
-    Skins stand in the pose of that frame, instances are repeated, guides and proxies left out. Subdivision surfaces are read
-    as their cages. Raises ModelError.
+    Skins have the pose of that frame, instances are repeated, and guides and proxies are left out. For subdivision surfaces,
+    the control cages are read. Raises ModelError.
     """
     stage = opened(folder)
     time = Usd.TimeCode(stage.GetStartTimeCode()) if stage.HasAuthoredTimeCodeRange() else Usd.TimeCode.EarliestTime()
@@ -67,7 +69,7 @@ class _Scene:
     _names: dict[str, int] = field(default_factory=dict[str, int])
 
     def below(self, prim: Any, world: Float, depth: int, above: int | None = None) -> Iterator[Primitive]:
-        """Return all that a render shows below a prim, whose matrix in the world is given."""
+        """Yield all visible triangles below a prim with this world matrix."""
         self.folder.check("MAX_NESTING", depth, "prims within one another")
         for child in prim.GetFilteredChildren(Usd.TraverseInstanceProxies()):
             yield from self._prim(child, self._matrix(child, world), depth, above)
@@ -87,7 +89,7 @@ class _Scene:
         yield from self.below(prim, world, depth + 1, above)
 
     def _is_shown(self, prim: Any) -> bool:
-        """Return whether a prim is not hidden itself; those above it are known to be shown."""
+        """Return whether a prim is not hidden itself; its ancestors are already known to be shown."""
         hidden = prim.GetVisibilityAttr().Get(self.time) == UsdGeom.Tokens.invisible
         return not hidden and prim.GetPurposeAttr().Get() not in (UsdGeom.Tokens.guide, UsdGeom.Tokens.proxy)
 
@@ -100,7 +102,7 @@ class _Scene:
         return local if form.GetResetXformStack() else parent @ local
 
     def _instanced(self, instancer: Any, world: Float, depth: int) -> Iterator[Primitive]:
-        """The prototypes of a point instancer, where it puts them."""
+        """The prototypes of a point instancer at its instances' poses."""
         matrices = instancer.ComputeInstanceTransformsAtTime(self.time, self.time)
         numbers = instancer.GetProtoIndicesAttr().Get(self.time) or ()
         targets = instancer.GetPrototypesRel().GetForwardedTargets()
@@ -154,7 +156,7 @@ class _Scene:
 
 
 def _part_name(prim: Any) -> str:
-    """The name of a prim, or of the transform that holds it alone, as programs write one for each object."""
+    """The name of a prim, or of its parent transform if that holds only this prim, since programs write one for each object."""
     parent = prim.GetParent()
     is_alone = parent.GetTypeName() == "Xform" and len(parent.GetAllChildren()) == 1 and not parent.GetParent().IsPseudoRoot()
     named = parent if is_alone and not parent.IsA(UsdGeom.Gprim) else prim
@@ -162,7 +164,9 @@ def _part_name(prim: Any) -> str:
 
 
 def _point_name(prim: Any) -> str:
-    """The point that a prim is said to be: by `userProperties:keypoint`, its display name or its name; else empty."""
+    """The name of the point that a prim represents, from `userProperties:keypoint`, its display name or its name; else
+    empty.
+    """
     attribute = prim.GetAttribute("userProperties:keypoint")
     said = attribute.Get() if attribute else None
     name = str(prim.GetDisplayName() or prim.GetName())

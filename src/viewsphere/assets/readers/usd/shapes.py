@@ -10,7 +10,7 @@ import numpy as np
 from viewsphere.assets.primitive import Float, Int
 
 AROUND, RINGS = 48, 24
-"""Segments around an axis, and from pole to pole: of a sphere the volume is 1.1 % too small."""
+"""Segments around an axis, and from pole to pole: a sphere's volume is then 1.1 % too small."""
 
 AXES = {"X": [2, 0, 1], "Y": [1, 2, 0], "Z": [0, 1, 2]}
 """Columns of the coordinates that turn a shape about z into one about another axis, right-handed."""
@@ -19,7 +19,7 @@ CUBE = [[0, 2, 6, 4], [1, 5, 7, 3], [0, 4, 5, 1], [2, 3, 7, 6], [0, 1, 3, 2], [4
 
 
 def polygons_of(prim: Any, time: Any) -> tuple[Float, Int, Int] | None:
-    """Points, corners and corners of each polygon, outward; None for prims that are no such shapes."""
+    """Points, corners and corners of each polygon, outward; None for other prims."""
     kind = str(prim.GetTypeName())
 
     def value(name: str) -> float:
@@ -78,5 +78,5 @@ def _turned(profile: Float) -> tuple[Float, Int, Int]:
 
 
 def _about(points: Float, corners: Int, counts: Int, prim: Any, time: Any) -> tuple[Float, Int, Int]:
-    axis = prim.GetAttribute("axis")  # of all but spheres
+    axis = prim.GetAttribute("axis")  # for all shapes except spheres
     return points[:, AXES[str(axis.Get(time)) if axis else "Z"]], corners, counts

@@ -14,7 +14,8 @@ from viewsphere.assets.readers.usd.mesh import Influences
 
 
 def skins_of(stage: Any, time: Any) -> tuple[dict[str, Influences], list[NamedPoint]]:
-    """The skins of meshes, by the meshes' paths, and the skeletons' joints in the world; then meshes stand as skinned.
+    """The skins of meshes, by the meshes' paths, and the skeletons' joints in the world; afterwards, the stage's meshes are
+    skinned.
 
     The stage's session layer receives the skinned points.
     """
@@ -54,7 +55,7 @@ def _influences(target: Any, query: Any, time: Any) -> Influences | None:
 
 
 def _names(order: Sequence[Any]) -> tuple[str, ...]:
-    """Names of joints, each another: the last part of their paths, or the whole path of two that share it."""
+    """Unique names of joints: the last part of their paths, or the whole path if two share the last part."""
     paths = [str(path) for path in order]
     lasts = [path.rpartition("/")[2] for path in paths]
     return tuple(last if lasts.count(last) == 1 else path for last, path in zip(lasts, paths, strict=True))

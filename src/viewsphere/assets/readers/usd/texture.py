@@ -1,4 +1,4 @@
-"""Textures of a USD shading network, and the pictures that carry out their scale, bias and channels."""
+"""Textures of a USD shading network, and pictures with their scale, bias and channels applied."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from viewsphere.assets.readers.usd.library import UsdShade
 from viewsphere.assets.srgb import linear, srgb_bytes
 
 WRAPS: dict[str, Wrap] = {"repeat": "repeat", "mirror": "mirror", "clamp": "clamp", "black": "clamp"}
-"""Wrap modes; a file's own (`useMetadata`) count as repeat, as files of textures seldom hold any."""
+"""Wrap modes; the mode in the file (`useMetadata`) counts as repeat, since texture files rarely store one."""
 
 CHANNELS = {"r": (0,), "g": (1,), "b": (2,), "a": (3,), "rgb": (0, 1, 2), "rgba": (0, 1, 2)}
 NO_SCALE, NO_BIAS = (1.0, 1.0, 1.0, 1.0), (0.0, 0.0, 0.0, 0.0)
@@ -47,7 +47,7 @@ class Producer:
 
     @property
     def shader(self) -> Any:
-        """The shader whose output it is."""
+        """The shader that has this output."""
         return UsdShade.Shader(self.attribute.GetPrim())
 
     def primvar(self, time: Any, kinds: tuple[str, ...]) -> str | None:
@@ -59,13 +59,13 @@ class Producer:
 
 
 def producer(entry: Any) -> Producer | None:
-    """The source of an input's value; None without one."""
+    """The source of an input's value, or None."""
     attributes = UsdShade.Utils.GetValueProducingAttributes(entry) if entry else ()
     return Producer(attributes[0]) if attributes else None
 
 
 def constant(shader: Any, name: str, time: Any) -> Any:
-    """The constant value of a shader's input, None where there is none."""
+    """The constant value of a shader's input, or None."""
     source = producer(shader.GetInput(name))
     return None if source is None or source.is_output else source.value(time)
 
@@ -88,7 +88,7 @@ class Sampled:
 
 
 def network_texture(folder: ModelFolder, source: Producer | None, time: Any, what: str) -> Sampled | None:
-    """The texture behind an input; None for constants and, with a warning, for what cannot be used."""
+    """The texture connected to an input; None for constants and, with a warning, for unusable textures."""
     if source is None or not source.is_output:
         return None
     shader, kind = source.shader, str(source.shader.GetIdAttr().Get())
@@ -167,13 +167,15 @@ def _image(folder: ModelFolder, shader: Any, time: Any) -> int | None:
 
 @dataclass(frozen=True, eq=False)
 class Baker:
-    """Makes the textures of a material: a picture as it is where that will do, else a new one; `uvs` are primvars in order."""
+    """Makes the textures of a material: the unchanged picture if that is enough, else a new one; `uvs` are primvars in
+    order.
+    """
 
     folder: ModelFolder
     uvs: tuple[str, ...]
 
     def colors(self, sampled: Sampled | None, plain: Color) -> tuple[Color, Texture | None]:
-        """Factor and texture of a colour that is light."""
+        """Factor and texture of a linear colour."""
         if sampled is None:
             return plain, None
         texture = self._placed(sampled)
@@ -286,6 +288,6 @@ def _alike(first: Float, second: Float) -> tuple[Float, Float]:
 
 
 def _spread(picture: Any, height: int, width: int) -> Any:
-    """The picture at another size, each texel the nearest one."""
+    """The picture at another size, by nearest-neighbour sampling."""
     rows, columns = (np.arange(n) * have // n for n, have in zip((height, width), picture.shape[:2], strict=True))
     return picture[rows[:, None], columns]
