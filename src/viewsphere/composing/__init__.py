@@ -1,1 +1,1 @@
-"""From a row to a shot: who stands where, moves how and is seen from where, in which light."""
+"""From a row to a shot: the places and motions of things, the cameras, and the light."""

@@ -11,10 +11,10 @@ from viewsphere.model.model_spec import ModelSpec
 
 
 def companions(seed: int, spec: ModelSpec, others: Iterable[ModelSpec], count: int, names: Names) -> tuple[ModelSpec, ...]:
-    """`count` of `others` to stand beside a model, which is none of them.
+    """`count` models of `others` as company of a model, which is not among them.
 
-    Each place goes to the one whose number for it is lowest (rendezvous hashing): one model more in the recipe changes
-    only the places that it takes.
+    Each place goes to the model with the lowest hash for it (rendezvous hashing): another model in the recipe changes only the
+    places that it gets.
     """
     left = {other.key: other for other in others if other.key != spec.key}
     chosen: list[ModelSpec] = []
@@ -25,10 +25,10 @@ def companions(seed: int, spec: ModelSpec, others: Iterable[ModelSpec], count: i
 
 
 def mixed(seed: int, models: Sequence[ModelSpec], count: int, names: Names, repeat: bool) -> tuple[ModelSpec, ...]:
-    """`count` of the models to stand together, each once at most unless they may `repeat`.
+    """`count` of the models for one scene, each at most once unless they may `repeat`.
 
-    They are those whose numbers are lowest: one model more in the recipe takes only places of its own, one at most
-    where none repeats.
+    The models with the lowest hashes are chosen: another model in the recipe changes only the places that it gets, at most one
+    without repeats.
     """
     if not repeat:
         return tuple(nsmallest(count, models, key=lambda spec: (share(seed, "cast", *names, spec.key), spec.key)))

@@ -1,4 +1,4 @@
-"""A recipe's scenes made concrete: targets on the floor, and what stands around them."""
+"""Concrete scenes of a recipe: targets on the floor, and their surroundings."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ from viewsphere.store import Category
 __all__ = ["BoxOf", "Composition", "Moved", "Numbering", "center", "center_of_all", "compose", "still"]
 
 Built = Callable[[float, float], Obstacles | None]
-"""Gives the parts of a place that stand up to a height, and up to a distance from the middle, metres."""
+"""Returns the parts of a place up to a height, and up to a distance from the middle, metres."""
 
 ABOVE_KERBS = 0.2
 """Metres above a zoo's road up to which its pieces are ground: kerbs, pavements and driveways are 0.14 m high at most."""
@@ -112,7 +112,7 @@ class Composition(Sendable):
 
     @cached_property
     def models(self) -> tuple[ModelSpec, ...]:
-        """The labelled scenery's models, each once: they are kept in the data set as the recipe's own are."""
+        """The models of labelled scenery, each once: the data set keeps them like the recipe's own."""
         return tuple({spec.key: spec for spec in self._labelled_models()}.values())
 
     def _labelled_models(self) -> Iterator[ModelSpec]:
@@ -138,9 +138,9 @@ class Composition(Sendable):
         return count
 
     def cast(self, spec: ModelSpec, pose: str | None, redraw: int = 0) -> tuple[ModelSpec, ...]:
-        """The targets of a frame: its model, and those drawn to stand beside it.
+        """The targets of a frame: its model, and its random company.
 
-        `pose` is the pose's name; None where nothing is drawn for each frame. `redraw` is the scene's.
+        `pose` is the pose's name; None if nothing is drawn for each frame. `redraw` is the number of the scene's redraw.
         """
         entry = self.recipe.scene.company
         if entry is None:
@@ -163,8 +163,8 @@ class Composition(Sendable):
         seen_from: tuple[float, float] | None = None,
         redraw: int = 0,
     ) -> tuple[Thing, ...]:
-        """The targets where they stand, the frame's model at the origin; raises RecipeError where there is no room. `again`
-        names another draw of where company stands; `seen_from`: azimuth and elevation, degrees, of the frame's camera.
+        """The placed targets, with the frame's model at the origin; raises RecipeError if there is not enough room. `again`
+        names another draw of the company's places; `seen_from`: azimuth and elevation, degrees, of the frame's camera.
         """
         own = standing(box_of(spec))
         company = self.company(spec, pose, box_of, own, again, memory, seen_from, redraw)
@@ -181,7 +181,7 @@ class Composition(Sendable):
         seen_from: tuple[float, float] | None = None,
         redraw: int = 0,
     ) -> Laid | None:
-        """Return the objects placed beside a frame's model, which has the pose `own`; None where nothing is placed."""
+        """Return the objects placed next to a frame's model, which has the pose `own`; None if there are none."""
         entry = self.recipe.scene.company
         if entry is None:
             return None
@@ -195,19 +195,19 @@ class Composition(Sendable):
         return laid(entry.layout, entry.orientation, cast, room, box_of, rng)
 
     def place_names(self, subject: str, pose: str | None, redraw: int = 0) -> Names:
-        """The names that a scene's place is drawn by."""
+        """The names that seed the draw of a scene's place."""
         place = self.recipe.scene.place
         names = draw_names(place.draw, subject, pose) if place else ()
         return names + redraw_names(redraw) if redraw and redraws_place(self.recipe) else names
 
     def free_floor(self, subject: str, pose: str | None, redraw: int = 0) -> Footprint | None:
-        """The floor that the place leaves free, None for all of it."""
+        """The free floor of the place, None for an unlimited floor."""
         place = self.recipe.scene.place
         return free_floor(self.recipe, place, self.place_names(subject, pose, redraw)) if place else None
 
     def built(self, subject: str, pose: str | None, redraw: int, world_from_room: Matrix4) -> Built | None:
-        """Gives what of the mesh of a place's file stands up to a height above a floor; None for a zoo's place, whose free
-        floor and surfaces are clear.
+        """A function that returns the parts of a place file's mesh up to a height above a floor; None for a zoo's place, whose
+        free floor and surfaces are clear.
         """
         place = self.recipe.scene.place
         if place is None or place.prefix:
@@ -217,8 +217,8 @@ class Composition(Sendable):
         return lambda height, reach: built_of((piece.model, None), room_from_piece, height, reach)
 
     def furniture(self, subject: str, pose: str | None, redraw: int) -> Built | None:
-        """Gives the parts of a zoo place's pieces that stand on its roads, bays and pavements, such as lamp posts and parked
-        cars, up to a height above the floor; None where the place is none of the zoo's.
+        """A function that returns the objects on the roads, bays and pavements of a zoo's place, such as lamp posts and parked
+        cars, up to a height above the floor; None for other places.
         """
         place = self.recipe.scene.place
         if place is None or not place.prefix:
@@ -228,17 +228,17 @@ class Composition(Sendable):
         return lambda height, reach: furniture_of(placed, height, reach)
 
     def lanes(self, subject: str, pose: str | None, redraw: int = 0) -> tuple[Lane, ...]:
-        """The lanes of the place where it stands, world axes; none where it has none."""
+        """The lanes of the place, in world axes; empty for places without."""
         place = self.recipe.scene.place
         return place_lanes(self.recipe, place, self.place_names(subject, pose, redraw)) if place else ()
 
     def bays(self, subject: str, pose: str | None, redraw: int = 0) -> tuple[Bay, ...]:
-        """The parking bays of the place where it stands, in world axes; empty for places without."""
+        """The parking bays of the place, in world axes; empty for places without."""
         place = self.recipe.scene.place
         return place_bays(self.recipe, place, self.place_names(subject, pose, redraw)) if place else ()
 
     def pavements(self, subject: str, pose: str | None, redraw: int = 0) -> tuple[Lane, ...]:
-        """The pavements of the place where it stands, in world axes; empty for places without."""
+        """The pavements of the place, in world axes; empty for places without."""
         place = self.recipe.scene.place
         return place_pavements(self.recipe, place, self.place_names(subject, pose, redraw)) if place else ()
 
@@ -258,7 +258,7 @@ class Composition(Sendable):
     ) -> tuple[Thing, ...]:
         """Return all placed things: targets, labelled scenery, then the scenery that is background.
 
-        `moved` gives pieces of scenery that the recipe moves (`piece.motion`) their motion.
+        `moved` returns pieces of scenery with the motions from the recipe (`piece.motion`).
         """
         pieces = self._pieces(subject, targets, pose, box_of, redraw)
         labelled = [p for p in pieces if p.labels == "own"]
@@ -285,7 +285,7 @@ class Composition(Sendable):
 
     @cached_property
     def _place(self) -> Callable[[Names], tuple[SceneryPiece, ...]]:
-        """The place's pieces for a draw; the last draws are kept, because many shots share one."""
+        """The place's pieces for a draw; the last draws are cached, because many shots share one."""
         entry = self.recipe.scene.place
         assert entry is not None
 
@@ -304,8 +304,8 @@ class Composition(Sendable):
 
 @dataclass(frozen=True, eq=False)
 class Numbering:
-    """The number of what a draw is for, in the data set's order: of a subject, of a frame, or of a sequence. `schedules` are
-    the subjects' own, none where every subject is taken from all poses.
+    """The number of the subject, frame or sequence of a draw, in the data set's order. `schedules` are the subjects' own, empty
+    if every subject has all poses.
     """
 
     subjects: tuple[str, ...]
@@ -313,7 +313,7 @@ class Numbering:
     schedules: tuple[Schedule, ...] = ()
 
     def __call__(self, names: Names) -> int:
-        """The number of a subject's name, or of a subject's and a frame's, or a sequence's."""
+        """The number for a subject's name, or for the names of a subject and a frame or sequence."""
         subject = self._subjects[names[0]]
         if len(names) == 1:
             return subject
@@ -342,10 +342,10 @@ def compose(
     splits: Sequence[str],
     numbering: Numbering,
 ) -> Composition:
-    """The composition of a recipe with these subjects, numbered so; `splits[i]` is what keeps `specs[i]` from the others:
-    its split, or one name for all.
+    """The composition of a recipe with these subjects and this numbering. Only models with equal `splits[i]` share a frame: the
+    split of `specs[i]`, or one name for all.
 
-    Raises RecipeError for pictures and places that are not there, and where there are too few models for company.
+    Raises RecipeError for missing pictures and places, and if there are too few models for company.
     """
     members: defaultdict[str, list[ModelSpec]] = defaultdict(list)
     for spec, split in zip(specs, splits, strict=True):
@@ -380,7 +380,7 @@ def built_of(shown: tuple[ModelSpec, None], room_from_piece: Matrix4, height: fl
 
 @lru_cache(maxsize=4)
 def furniture_of(pieces: tuple[tuple[ModelSpec, Matrix4], ...], height: float, reach: float) -> Obstacles | None:
-    """The triangles of a place's pieces between its kerbs and a height; the last results are kept. Pieces of one model follow
+    """The triangles of a place's pieces between its kerbs and a height; the last results are cached. Pieces of one model follow
     one another, so that each mesh is read once.
     """
     vertices, triangles, count = list[NDArray[np.float64]](), list[NDArray[np.int32]](), 0
@@ -418,7 +418,9 @@ def center_of_all(things: Sequence[Thing], box_of: BoxOf) -> Vector:
 
 
 def _blend(recipe: Recipe, numbering: Numbering) -> BlendScenery | None:
-    """The recipe's .blend file; frames take turns in the order of their numbers. Raises RecipeError where it does not fit."""
+    """The recipe's .blend file; its variants alternate in the order of frame numbers. Raises RecipeError if recipe and file do
+    not match.
+    """
     entry, views = recipe.scene.blend, numbering.views
     if entry is None:
         return None

@@ -1,4 +1,4 @@
-"""Cameras whose distance follows from how much of the picture is filled: the projected models decide, as their labels do."""
+"""Cameras whose distance follows from the filled share of the picture, measured on the projected models as in labels."""
 
 from __future__ import annotations
 
@@ -27,10 +27,12 @@ CLOSE_ENOUGH = 1e-9
 """Tolerance of the filled share, relative to the requested one."""
 
 MOST_STEPS = 100
-"""Distances that are tried before a search is given up, as where a lens shows a model in part before it fills its share."""
+"""Number of tried distances before a search ends without a result, for example if the lens cuts a model off before it fills its
+share.
+"""
 
 NEAREST = 1e9
-"""Least distance of the search, as a fraction of the model's length: one over this."""
+"""The least distance of the search is the model's length divided by this number."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,7 +46,7 @@ class Shape:
 
 @lru_cache(maxsize=64)
 def shape_of(shown: tuple[ModelSpec, TimeStep | None]) -> Shape:
-    """The shape of a model at a time step; the last ones are kept. Raises ModelError if its file cannot be used."""
+    """The shape of a model at a time step; the last results are cached. Raises ModelError if its file cannot be used."""
     from viewsphere.assets.cache import load_normalised  # which loads readers of models
 
     spec, step = shown
@@ -55,10 +57,10 @@ def shape_of(shown: tuple[ModelSpec, TimeStep | None]) -> Shape:
 
 
 def filled(shot: Shot, together: bool) -> Shot:
-    """The shot with cameras at the distances at which the frame's model, or all targets `together`, fill as much of the
-    pictures of the rig's first sensor as their viewpoints ask for. A viewpoint's own distance is a factor then.
+    """The shot with cameras at distances that fill the requested share of the picture of the rig's first sensor, with the
+    frame's model or with all targets `together`. A viewpoint's own distance is then a factor.
 
-    Raises RecipeError where no distance is right.
+    Raises RecipeError if no distance fills the share.
     """
     if all(now.viewpoint is None or now.viewpoint.fill is None for now in shot.instants):
         return shot
@@ -100,13 +102,13 @@ def _placed(thing: Thing) -> Shape:
 
 
 def _reach(placed: Sequence[Shape], now: Instant) -> float:
-    """Metres from what the camera looks at to the farthest vertex."""
+    """Metres from the camera's target to the farthest vertex."""
     return max(float(np.linalg.norm(shape.vertices - np.array(now.focus), axis=1).max()) for shape in placed) or 1.0
 
 
 def share_filled(camera: Camera, placed: Sequence[Shape]) -> float:
-    """The larger of box width / picture width and box height / picture height, of the box around all shapes, which stand in
-    the world, as the camera projects them: that of the label `box2d_unclipped`. Infinite where it does not show all of them.
+    """The larger of box width / picture width and box height / picture height, for the box around all shapes (in world axes) as
+    the camera projects them, as in the label `box2d_unclipped`. Infinite if the lens does not show all of them.
     """
     boxes = [projected_bounds(camera, s.vertices, s.triangles, s.is_used) for s in placed]
     if not all(whole and bounds for bounds, whole in boxes):
@@ -117,11 +119,11 @@ def share_filled(camera: Camera, placed: Sequence[Shape]) -> float:
 
 
 def distance_of(fill: float, fill_at: Callable[[float], float], reach: float) -> float | None:
-    """The distance, metres, to twelve digits, at which `fill_at`, which falls with it, is `fill`; None if there is none up to
-    `FARTHEST`. `reach`: a length like the models'.
+    """The distance, metres, to twelve digits, at which `fill_at` is `fill`; None if there is none up to `FARTHEST`. `fill_at`
+    decreases with distance. `reach`: a length of the models' order of magnitude.
 
-    False position (the Illinois way, Dowell and Jarratt 1971) between a near and a far end, by the inverse of the distance, to
-    which shares are nearly proportional; the ends are halved while all that is known of the near one is that it is too near.
+    False position (the Illinois algorithm, Dowell and Jarratt 1971) between a near and a far end, in the inverse distance, to
+    which shares are nearly proportional. Bisection is used while the near end is only known to be too near.
     """
     near = far = 1 / reach
     above = below = fill_at(1 / near) - fill

@@ -1,4 +1,4 @@
-"""From what a recipe says of a layout to where models stand, how they came there, and what they stand in."""
+"""From a recipe's layout to the poses of models, their paths to these, and the scenery around them."""
 
 from __future__ import annotations
 
@@ -32,14 +32,14 @@ NEEDS = ("trimesh", "networkx", "scipy")
 """Packages of the extra physics."""
 
 RAREST = 0.02
-"""Share of its falls after which a model comes to lie in a way, below which it is taken for one on which it tips over."""
+"""Smallest probability of a stable pose; rarer poses are treated as ones from which the model tips over."""
 
 
 Float = NDArray[np.float64]
 
 
 class BoxOf(Protocol):
-    """Gives the 3D box (8, 3) of a normalised model at a time step (None: as it rests) in its own axes, metres."""
+    """Returns the 3D box (8, 3) of a normalised model at a time step (None: at rest) in its own axes, metres."""
 
     def __call__(self, spec: ModelSpec, step: TimeStep | None = None, /) -> NDArray[np.float64]:
         """The box, float64."""
@@ -47,7 +47,7 @@ class BoxOf(Protocol):
 
 
 Remembering = Callable[[tuple[str, ...], Callable[[], Any]], Any]
-"""Gives the plain data that a function makes for names, or what it made when it was first asked for the same."""
+"""Returns the plain data that a function makes for names, cached from the first call with the same names."""
 
 
 def unremembered(names: tuple[str, ...], make: Callable[[], Any]) -> Any:
@@ -63,21 +63,21 @@ def remembered_as(entry: ScenesEntry | CompanyEntry, cast: Sequence[ModelSpec], 
 
 @dataclass(frozen=True)
 class Carried:
-    """A way in other axes: of a model that was turned in its own before, in a room that stands somewhere in the world."""
+    """A path in world axes, for a model that was turned in its own axes before, in a room with a pose in the world."""
 
     way: Way
     world_from_room: Matrix4
     turned: Matrix4
 
     def at(self, seconds: float) -> Matrix4:
-        """World from object at a time, seconds from the way's first."""
+        """World from object at a time, seconds from the start of the path."""
         return composed(self.world_from_room, composed(self.way.at(seconds), self.turned))
 
 
 @dataclass(frozen=True, eq=False)
 class Laid:
-    """Models that a placer places in a room, each turned in its own axes before (`turns`); the room stands somewhere in the
-    world. Nothing is placed before it is asked for.
+    """Models that a placer places in a room, each turned in its own axes before (`turns`); the room has a pose in the world.
+    Placing happens on first access.
     """
 
     layout: Layout
@@ -90,7 +90,7 @@ class Laid:
 
     @cached_property
     def poses(self) -> tuple[Matrix4, ...]:
-        """World from object of each; raises RecipeError where there is no room."""
+        """World from object of each model; raises RecipeError if there is not enough room."""
         placer, options = _placer(self.layout, self.room.field)
         poses = placer.place(self.members, self.room, self.shapes, (), self.rng, *options)
         return tuple(self._in_world(pose, turn) for pose, turn in zip(poses, self.turns, strict=True))
@@ -106,7 +106,7 @@ class Laid:
 
     @cached_property
     def around(self) -> tuple[Piece, ...]:
-        """The pieces of scenery that they stand in, in the world."""
+        """The pieces of scenery that the placer adds, in world axes."""
         placer, options = _placer(self.layout, self.room.field)
         if placer.around is None:
             return ()
@@ -127,7 +127,7 @@ def laid(
     rng: Draws,
     world_from_room: Matrix4 = IDENTITY,
 ) -> Laid:
-    """The models as the layout places them, upright, or turned before: to `any` side, or to one on which they may lie."""
+    """The models as the layout places them, upright or turned before: in `any` direction, or into a stable pose."""
     shapes = [shape(spec, box_of) for spec in cast]
     if orientation == "upright":
         return Laid(layout, tuple(cast), tuple(shapes), (IDENTITY,) * len(shapes), room, rng, world_from_room)
@@ -141,31 +141,31 @@ def laid(
 
 
 def check_layout(layout: Layout, field: str) -> None:
-    """See that a placer can place; raises RecipeError for an unknown one and for options that it does not have, which begins
-    with the field's name, and MissingExtraError for packages that it needs.
+    """Check the placer of a layout; raises RecipeError, beginning with the field's name, for an unknown placer or option, and
+    MissingExtraError for missing packages.
     """
     placer, _ = _placer(layout, field)
     check_packages(placer.packages, "physics", f"{field}.layout: {placer_of(layout)}")
 
 
 def check_orientation(orientation: str, field: str) -> None:
-    """See that things can be turned in this way; raises MissingExtraError for packages that it needs."""
+    """Check that this orientation is available; raises MissingExtraError for missing packages."""
     if orientation == "stable":
         check_packages(NEEDS, "physics", f"{field}.orientation: stable")
 
 
 def has_ways(layout: Layout) -> bool:
-    """Return whether the placer knows how things came to where they stand."""
+    """Return whether the placer reports the paths of things to their places."""
     return plugins.load(PlacerSpec, placer_of(layout)).ways is not None
 
 
 def is_slow(layout: Layout) -> bool:
-    """Return whether where things stand is not asked before frames are rendered."""
+    """Return whether the placer is too slow to run before rendering."""
     return plugins.load(PlacerSpec, placer_of(layout)).is_slow
 
 
 def shape(spec: ModelSpec, box_of: BoxOf) -> Shape:
-    """A model's shape for a placer. Boxes are known of the data set's own models; others are read for theirs."""
+    """A model's shape for a placer. The boxes of the data set's models are known; other models are read."""
     box = box_of(spec) if spec.category_id else _box(spec)
     return Shape(box, partial(_vertices, spec), partial(_surface, spec))
 
@@ -196,9 +196,9 @@ def _surface(spec: ModelSpec) -> tuple[Float, NDArray[np.int32]]:
 
 
 def stable_turn(hull: Float, rng: np.random.Generator) -> Float:
-    """A rotation (3, 3) of a model with these corners of its convex hull (N, 3) that lets it lie on z = 0: each way to lie is
-    as likely as the model, let go at random, is to come to rest so (Goldberg et al. 1999, by trimesh's `compute_stable_poses`).
-    Turned about the vertical at random.
+    """A rotation (3, 3) into a stable pose on z = 0, for a model with these corners of its convex hull (N, 3). Each stable pose
+    has the probability that the model, dropped at random, comes to rest in it (Goldberg et al. 1999, by trimesh's
+    `compute_stable_poses`). The turn about the vertical is random.
 
     Raises MissingExtraError without the packages that it needs.
     """

@@ -28,7 +28,7 @@ class Noise:
 
 
 def noise(rng: np.random.Generator, components: int, highest_hz: float) -> Noise:
-    """Noise of so many independent components; of the frequencies one lies in each of WAVES equal bands up to the highest."""
+    """Noise of independent components; each of WAVES equal bands up to the highest frequency contains one frequency."""
     draws = rng.random((components, 2, WAVES))
     return Noise((np.arange(WAVES) + draws[:, 0]) * (highest_hz / WAVES), draws[:, 1] * (2 * math.pi))
 

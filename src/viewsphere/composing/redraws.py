@@ -1,4 +1,4 @@
-"""Draws that do not fit are drawn again: which parts of a recipe that can change, and how often.
+"""Redraws of draws that do not fit: the parts of a recipe that they change, and their number.
 
 A frame's redraw changes its viewpoint, jitter and company; a scene's redraw changes its place, its models and where they stand.
 Both are keyed by stable names and the number of the redraw, and number 0 is the original draw.
@@ -15,17 +15,17 @@ from viewsphere.recipe.recipe import Recipe
 from viewsphere.recipe.world.scenes import ScenesEntry
 
 RANDOM = Sphere | Normal | Jitter
-"""Viewpoints that are drawn."""
+"""Kinds of random viewpoints."""
 
 SLOW_SHARE = 8
 """A simulated layout is redrawn this many times less often: each of its redraws already tries ten falls, seconds each."""
 
 SAME_MODELS = 8
-"""Redraws of one choice of models: most scenes fit once their models stand elsewhere; choosing others favours small ones."""
+"""Redraws of one choice of models: most scenes fit with other places; choosing other models would favour small ones."""
 
 
 def redraws_frames(recipe: Recipe) -> bool:
-    """Return whether a still frame has a viewpoint, jitter or company of its own that can be drawn again."""
+    """Return whether a still frame has its own viewpoint, jitter or company that can be drawn again."""
     if recipe.time is not None:
         return False
     company, jitter = recipe.scene.company, recipe.scene.jitter
@@ -73,12 +73,12 @@ def redraws_each(recipe: Recipe) -> int:
 
 
 def fewer(recipe: Recipe, redraw: int) -> int:
-    """The number of objects that a redraw drops from a scene that asks for more than its least."""
+    """The number of objects that a redraw drops from a scene with more than its least number."""
     return redraw // redraws_each(recipe) if redraw else 0
 
 
 def least_objects(recipe: Recipe, objects: int) -> int:
-    """The fewest objects that a scene of so many may be left with; listed and balanced scenes keep all."""
+    """The fewest objects that redraws may leave of a scene with this many; listed and balanced scenes keep all."""
     scenes, company = recipe.scenes, recipe.scene.company
     if isinstance(scenes, ScenesEntry):
         return objects if scenes.spots or scenes.balance == "category" else int(span(scenes.objects)[0])

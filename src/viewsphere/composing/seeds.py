@@ -1,4 +1,4 @@
-"""The source of randomness: a generator, or a number, for a seed and the stable names of the drawn value."""
+"""The source of randomness: a generator, or a number, from a seed and the stable names of the drawn value."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def _told(name: str) -> bytes:
 
 
 def generator(seed: int, *names: str) -> np.random.Generator:
-    """A generator for what these names mean (a purpose, a model's key, a pose's values), never a position in a list.
+    """A generator for these names (a purpose, a model's key, a pose's values), never for a position in a list.
 
     Its stream is `SeedSequence(seed, spawn_key=<128-bit digest of the names>)`: the same whatever else is drawn.
     """
@@ -43,7 +43,7 @@ def share(seed: int, *names: str) -> float:
 
 
 def shares(seed: int, *names: str, each: Iterable[str]) -> list[float]:
-    """`share(seed, *names, name)` for each name: what is before it is read once."""
+    """`share(seed, *names, name)` for each name; the common names are hashed once."""
     begun, found = hashlib.blake2b(digest_size=8), list[float]()
     for name in (str(seed), *names):
         begun.update(_told(name))

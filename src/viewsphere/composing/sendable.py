@@ -7,7 +7,7 @@ from typing import Any, cast
 
 
 class Sendable:
-    """A dataclass of which other processes are sent the fields alone: what was computed from them is computed again there."""
+    """A dataclass that is sent to other processes as its fields alone: derived values are computed again there."""
 
     def __getstate__(self) -> dict[str, Any]:
         """The fields by name."""

@@ -14,9 +14,9 @@ Cells = dict[str, str | None]
 
 
 def table_rows(path: Path, columns: Sequence[str]) -> Iterator[tuple[str, Cells]]:
-    """The rows of a table of these columns, and maybe others, each with its place, `FILE:LINE`.
+    """The rows of a table with these and possibly more columns, each with its place, `FILE:LINE`.
 
-    Raises RecipeError, which names file and line, for a file that is none, or that lacks a column.
+    Raises RecipeError, which names file and line, for a file that is not a table, or lacks a column.
     """
     rows = csv.DictReader(StringIO(_text(path, columns), newline=""), skipinitialspace=True)
     try:
@@ -36,7 +36,9 @@ def table_rows(path: Path, columns: Sequence[str]) -> Iterator[tuple[str, Cells]
 
 
 def known_columns(wanted: Sequence[str], found: Sequence[str]) -> str:
-    """A table's columns for a message. Where none is a wanted one the file is no such table, and none of it is quoted."""
+    """A table's columns for a message. If no column is a wanted one, the file is another kind of table, and nothing of it is
+    quoted.
+    """
     if not found:
         return "nothing"
     return ", ".join(found) if set(wanted) & set(found) else "none of these"

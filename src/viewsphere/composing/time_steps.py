@@ -1,4 +1,4 @@
-"""Time steps: what of a recipe moves, at which frames of its files, and the poses that are taken then."""
+"""Time steps: the animated models of a recipe, the frames of their files, and the poses at each."""
 
 from __future__ import annotations
 
@@ -28,8 +28,8 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Step:
-    """A time step of a data set: when it is, what of the model's file it shows, and the frame of the scene's file; None where
-    they do not move.
+    """A time step of a data set: its time, the time step of the model's file, and the frame of the scene's file; the latter two
+    are None without animation.
     """
 
     moment: Moment
@@ -39,7 +39,7 @@ class Step:
 
 @dataclass(frozen=True)
 class Timing:
-    """The time steps of a model; each is taken from all poses, or `moving` from the pose of its number."""
+    """The time steps of a model; each has all poses or, if `moving`, the pose of the same number."""
 
     steps: tuple[Step, ...]
     moving: bool = False
@@ -47,7 +47,7 @@ class Timing:
 
 @dataclass(frozen=True)
 class Run:
-    """Poses [first, stop) of a model that show it at one time step: its number, None where nothing moves."""
+    """Poses [first, stop) of a model at one time step, given by its number; None without animation."""
 
     first: int
     stop: int
@@ -57,26 +57,26 @@ class Run:
 
 @dataclass(frozen=True)
 class TimedPoses(RepeatedPoses):
-    """Poses at moments; the moment is the outer loop. At no moment (None) they are the poses themselves."""
+    """Poses at moments; the moment is the outer loop. Without moments (None), they are the poses themselves."""
 
     moments: tuple[Moment | None, ...]
 
     @property
     def digest(self) -> str:
-        """SHA-256 of the moments, and of what stands in a file of poses."""
+        """SHA-256 of the moments, and of the content of a pose file."""
         return hashlib.sha256(repr((self.base.digest, self.moments)).encode()).hexdigest()
 
     @property
     def counts(self) -> dict[str, int]:
-        """Number of moments, then those of the poses."""
+        """Number of moments, then the counts of the poses."""
         return {"time steps": len(self.moments), **self.base.counts}
 
     def taken(self, index: int) -> int:
-        """The pose, whenever it is taken."""
+        """The number of the pose without its moment."""
         return index % len(self.base)
 
     def name(self, index: int) -> str:
-        """The pose's and the moment's."""
+        """The names of the pose and the moment."""
         moment = self._moment(index)
         name = self.base.name(self.taken(index))
         return name if moment is None else f"{name} at frame {moment.frame}, {moment.seconds!r} s"
@@ -94,18 +94,18 @@ class TimedPoses(RepeatedPoses):
 
 
 def is_animated(recipe: Recipe) -> bool:
-    """Return whether the recipe asks for frames of anything."""
+    """Return whether the recipe requests frames of any file."""
     return _scene_frames(recipe) is not None or any(entry.frames is not None for entry in recipe.models)
 
 
 def timed(
     recipe: Recipe, models: Sequence[tuple[ModelSpec, int]], views: Poses
 ) -> tuple[tuple[ModelSpec, ...], tuple[Timing | None, ...], Poses]:
-    """The models as at the first frame, their time steps, and the poses at all moments; `models` are specifications with the
+    """The models at their first frame, their time steps, and the poses at all moments; `models` are specifications with the
     number of their entry.
 
-    Raises RecipeError for frames that files do not have and for files in which nothing moves, of all models together, and for
-    other numbers of poses or of the scene's time steps where they have to be equal.
+    Raises RecipeError, for all models together, for missing frames and for files without movement; also if the numbers of poses
+    or of the scene's time steps differ where they must be equal.
     """
     if not is_animated(recipe):
         return tuple(spec for spec, _ in models), (None,) * len(models), views
@@ -144,7 +144,7 @@ def _timing(
     own: Sequence[tuple[int, Moment]] | None,
     scene: Sequence[tuple[int, Moment]],
 ) -> Timing | None:
-    """A model's time steps: its own, or the scene's; where both move, the k-th of one go with the k-th of the other."""
+    """A model's time steps: its own, or the scene's; if both move, their k-th steps go together."""
     if not scene:
         steps = tuple(Step(moment, _shown(moment)) for _, moment in own or ())
         return Timing(steps, entry.poses == "moving") if steps else None
@@ -161,7 +161,7 @@ def _timing(
 
 
 def resting(spec: ModelSpec, entry: ModelEntry, line: Timeline) -> ModelSpec:
-    """An animated model as at the first frame of what its entry says that it plays."""
+    """An animated model at the first frame of the animation that its entry selects."""
     return spec.model_copy(update={"rest": line.first, "clip": entry.clip, "fps": entry.fps})
 
 
@@ -211,7 +211,9 @@ def _steps(
 
 
 def animated_file(spec: ModelSpec, field: str) -> Path:
-    """The file of a model that is to move; raises RecipeError, which begins with the field, for one of a source that stays."""
+    """The file of a model that is to move; raises RecipeError, which begins with the field, for a source's model without
+    animation.
+    """
     try:
         file = file_in(spec)
     except OSError as error:
@@ -247,7 +249,7 @@ def at_step(timing: Timing | None, number: int | None) -> TimeStep | None:
 
 @dataclass(frozen=True, eq=False)
 class Schedule:
-    """The poses of a model, in the order of its frames, parted by its time steps."""
+    """The poses of a model, in the order of its frames, divided by its time steps."""
 
     runs: tuple[Run, ...]
 
@@ -271,11 +273,11 @@ class Schedule:
         return self._before[number] + pose - self.runs[number].first
 
     def together(self, poses: Sequence[int]) -> list[list[int]]:
-        """The poses, parted where the time step changes."""
+        """The poses, divided where the time step changes."""
         return [list(group) for _, group in groupby(poses, self._number)]
 
     def chunks(self, most: int) -> tuple[tuple[int, int], ...]:
-        """Poses [first, stop) of each shot of at most so many: sizes within a time step differ by one at most."""
+        """Poses [first, stop) of each shot, at most `most` each: sizes within a time step differ by one at most."""
         found: list[tuple[int, int]] = []
         for run in self.runs:
             count = run.stop - run.first

@@ -12,9 +12,9 @@ from numpy.typing import DTypeLike, NDArray
 
 @dataclass(frozen=True)
 class Channel:
-    """One array of pixels: (height, width) + (components,) if components > 1; `encoding` is its default file. With no
-    components it is no picture but rows, as many as there are. `colors`, sRGB: of the first ids, in files with a palette.
-    `in_steps`: a PNG file has it in whole steps of the recipe's `files.depth_unit`.
+    """One array of pixels: (height, width) + (components,) if components > 1; `encoding` is its default file. A channel without
+    components has any number of rows instead of pixels. `colors`: sRGB colours of the first ids, for files with a palette.
+    `in_steps`: PNG files store whole steps of the recipe's `files.depth_unit`.
     """
 
     name: str
@@ -59,7 +59,7 @@ PASSES: dict[str, Channel] = {
         Channel("metallic", np.float32, 1, "1", 0, "tiff", "how much of the seen surface is metal, 0 to 1"),
     )
 }
-"""Channels that an engine paints; all others are labels. All but the pictures are arrays, docs/pictures.md says of what."""
+"""Channels that an engine paints; all others are labels. All but the pictures are arrays; docs/pictures.md describes them."""
 
 PICTURES = ("rgb", "rgba")
 """The passes that are pictures, which every engine paints. The first that a data set keeps is its samples' picture."""

@@ -1,4 +1,4 @@
-"""The author of a model, and the terms of its licence."""
+"""The author and the licence of a model."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def _one_line(text: str) -> str:
 
 
 def _url(text: str) -> str:
-    """The characters that RFC 3986 has not are refused, so that no URL ends a link or a cell of a table."""
+    """Refuse characters outside RFC 3986, so that a URL cannot end a Markdown link or a table cell."""
     if not re.fullmatch(r"https?://[^\s<>\"\\^`{|}]+", text):
         raise ValueError(f"expected a URL that begins with https:// or http://, without spaces; found {shown(text)}")
     return text
@@ -36,7 +36,7 @@ SourceUrl = Annotated[
 
 
 class Credit(Frozen):
-    """A model's licence, whom to name, and where it comes from; None for what is not known."""
+    """A model's licence, its attribution and its source; unknown ones are None."""
 
     licence: Licence = None
     attribution: Attribution = None

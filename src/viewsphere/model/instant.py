@@ -1,4 +1,4 @@
-"""An instant: a moment at which all of a rig's sensors take their pictures, and what may change with it."""
+"""An instant: a moment at which all sensors of a rig take their pictures, and the state that may change with it."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from viewsphere.model.scene import Finish, Matrix4, Vector
 from viewsphere.model.sensors.camera import Intrinsics
 
 NEAREST = 1e-3
-"""Metres ahead of a camera from which on a point may be what it looks at."""
+"""Smallest distance, in metres ahead of a camera, of the point that it looks at."""
 
 
 class Moment(Frozen):
@@ -45,7 +45,9 @@ class Viewpoint(OmitNone):
     fill: float | None = None
 
     def rounded(self) -> Viewpoint:
-        """The same to nine decimal places: the last digits of angles that follow from a matrix differ between processors."""
+        """The viewpoint rounded to nine decimal places, because the last digits of angles from a matrix differ between
+        processors.
+        """
         names = ("azimuth_deg", "elevation_deg", "distance", "tilt_deg")
         values = {name: round(getattr(self, name), 9) + 0.0 for name in names}
         values["azimuth_deg"] %= 360.0
@@ -56,8 +58,8 @@ class Viewpoint(OmitNone):
 def viewpoint_of(
     world_from_camera: ArrayLike, focus: Vector, index: int, bins: float = 45.0, time: Moment | None = None
 ) -> Viewpoint:
-    """The viewpoint of a camera with this pose (4, 4), OpenCV axes: around the point on its axis that is nearest to `focus`,
-    1 m ahead of it if that lies behind. `bins`: width of the named categories, degrees.
+    """The viewpoint of a camera with this pose (4, 4), OpenCV axes: around the point on its axis that is nearest to `focus`, or
+    1 m ahead of the camera if that point is behind it. `bins`: width of the named categories, degrees.
     """
     pose = np.asarray(world_from_camera, np.float64)
     rotation, center = np.ascontiguousarray(pose[:3, :3].T), pose[:3, 3]
@@ -78,13 +80,13 @@ def viewpoint_of(
 
 
 class Instant(Frozen):
-    """One instant of a shot: where the rig is, what it looks at, and what the pictures are made of then.
+    """One instant of a shot: the pose of the rig, the point that it looks at, and the finish and lens of its pictures.
 
-    `index` counts the instants of a sequence from 0, of still pictures those of the data set. `world_from_rig` is the pose of
-    the rig's first sensor (OpenCV axes, metres); `focus` (world metres) is what it looks at. `viewpoint` says how the pose was
-    asked for, where it comes from a grid or list. `finish` replaces the scene's; `intrinsics`, where a lens zooms, that of the
-    rig's first sensor, and of those that have the same, at the same size. An instant that is not `recorded` is there only
-    because labels of others need it: no picture is taken then.
+    `index` counts from 0, in the sequence or, for still pictures, in the data set. `world_from_rig` is the pose of the rig's
+    first sensor (OpenCV axes, metres); `focus` (world metres) is what it looks at. `viewpoint` is the requested pose, if it
+    comes from a grid or list. `finish` replaces the scene's finish. For a zooming lens, `intrinsics` replaces the intrinsics of
+    the rig's first sensor, and of sensors with the same ones, at the same size. An instant that is not `recorded` has no
+    picture: labels of other instants need it.
     """
 
     index: int

@@ -1,4 +1,4 @@
-"""Shots that are listed one by one: a camera, and which model is where. A file of them has one a line, as JSON."""
+"""Shots that are listed one by one: a camera, and the models with their poses. A file of shots has one a line, as JSON."""
 
 from __future__ import annotations
 

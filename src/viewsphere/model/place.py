@@ -1,4 +1,4 @@
-"""The nouns of places: a layout of models around a free spot where targets stand, with lanes, bays, pavements and surfaces.
+"""Data classes of places: a layout of models around a free spot for targets, with lanes, bays, pavements and surfaces.
 
 Frame: metres, +Z up, the floor at z = 0, the origin on a free stretch of the floor.
 """
@@ -30,8 +30,8 @@ class PlacePiece:
 
 @dataclass(frozen=True)
 class Lane:
-    """A way through a place: the points of its middle in the direction of travel, two at least, and its width, metres. From the
-    last point of a closed lane it goes on to the first. name is unique in its place.
+    """A way through a place: the points of its middle in the direction of travel, two at least, and its width, metres. A closed
+    lane continues from its last point to its first. name is unique in its place.
     """
 
     name: str
@@ -42,9 +42,9 @@ class Lane:
 
 @dataclass(frozen=True)
 class Surface:
-    """A level rectangle above the floor where things may stand, such as a table's top: a frame whose origin is its middle, +Z
-    up, its size along the frame's x and y, and the metres of air above it, None where that has no end. name is unique in its
-    place.
+    """A level rectangle above the floor on which things may stand, such as a table's top: a frame with its origin in the middle
+    and +Z up, the size along the frame's x and y, and the free height above it in metres, None if unlimited. name is unique in
+    its place.
     """
 
     name: str
@@ -57,8 +57,8 @@ class Surface:
 class LevelFace:
     """A level face of a model on which things stand, in the model's axes, metres.
 
-    rectangle: low x, low y, high x, high y of what is free of it; height: its z; clearance: what is free above it, inf under
-    the open sky. On cushions and bedding the mesh may lie up to 3 cm above or below `height`.
+    rectangle: low x, low y, high x, high y of its free part; height: its z; clearance: the free height above it, inf under the
+    open sky. On cushions and bedding the mesh may be up to 3 cm above or below `height`.
     """
 
     name: str
@@ -69,7 +69,7 @@ class LevelFace:
 
 @dataclass(frozen=True)
 class Bay:
-    """A space to park in: a frame whose origin is its middle, +Z up, -Y where a parked vehicle's front points, and its size
+    """A parking space: a frame with its origin in the middle, +Z up, -Y towards the front of a parked vehicle, and its size
     along the frame's x and y, metres.
     """
 
@@ -80,7 +80,7 @@ class Bay:
 @dataclass(frozen=True)
 class Traffic:
     """A place's own traffic: the share of its bays that are taken, None for the place's usual share, and the number of people
-    on its pavements. A place with roads lays it out.
+    on its pavements. Only places with roads have traffic.
     """
 
     parked: float | None = None
@@ -88,14 +88,14 @@ class Traffic:
 
 
 USUAL = Traffic()
-"""The traffic of a place for which nothing else is asked."""
+"""The default traffic of a place."""
 
 
 @dataclass(frozen=True)
 class Place:
-    """A layout, of which nothing is built yet. `free`: lowest x and y, highest x and y of the floor that is left to targets;
-    None where this floor has no end. `lanes`: where things may drive. `bays`: where vehicles may park. `pavements`: where
-    people may walk, either way. `surfaces`: where things may stand above the floor.
+    """A layout whose pieces are not built yet. `free`: lowest x and y, highest x and y of the floor for targets, None if
+    unlimited. `lanes` are for driving, `bays` for parking, `pavements` for walking in either direction, and `surfaces` for
+    things above the floor.
     """
 
     pieces: tuple[PlacePiece, ...]

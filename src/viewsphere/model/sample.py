@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from viewsphere.model.annotations.voxels import VoxelGrid
 
 MERGED = "-merged-"
-"""Between the name of a sequence and its number, where merged data sets have several of one name."""
+"""Separator between a sequence's name and its number, where merged data sets have several of one name."""
 
 Float = NDArray[np.float64]
 Box = tuple[float, float, float, float]
@@ -35,7 +35,7 @@ Box = tuple[float, float, float, float]
 class ObjectView:
     """The camera as one object sees it: its orbit around the object's box centre, in the object's own axes.
 
-    A camera that does not look at that point counts, for the tilt, as turned to it by the shortest way.
+    The tilt is that of the camera after the shortest turn towards that point.
     """
 
     azimuth_deg: float
@@ -76,8 +76,8 @@ class ObjectAnnotation:
     An imported object has `source`, its annotation in the imported data set; values that the annotation lacks are NaN, and
     key and model may be empty. If it lacks a mask, the mask is empty, but `box2d` and `area` are the annotation's.
 
-    `extra` holds the fields of labels that were asked for, and of those that other packages bring; these fields are attributes,
-    too. So are those of labels that follow from what every data set has, asked for or not.
+    `extra` holds the fields of requested labels, and of labels from other packages; these fields are attributes, too. So are
+    the fields of labels that can be derived from any data set, requested or not.
     """
 
     id: int
@@ -130,12 +130,12 @@ class ObjectAnnotation:
 
     @property
     def is_boxed(self) -> bool:
-        """Return whether its place in space and its size are known; of some imported objects only the pose is."""
+        """Return whether its pose and its size are known; some imported objects have only a pose."""
         return self.is_placed and not math.isnan(self.size[0])
 
     @property
     def mask(self) -> NDArray[np.bool_]:
-        """Visible pixels, (H, W) bool. Raises UserError for run lengths, which a stranger may have written, that are none."""
+        """Visible pixels, (H, W) bool. Raises UserError for invalid run lengths, which an imported data set may contain."""
         from viewsphere.codecs.size import check_size
         from viewsphere.geometry.mask import decode_rle
 
@@ -157,8 +157,8 @@ class ObjectAnnotation:
 
 @dataclass(frozen=True, eq=False)
 class Origin:
-    """Of which shot a sample is, at which instant and by which sensor, both counted from 0 there: the shot itself, or the root
-    of a data set and the key of the shot in it.
+    """The shot, the instant and the sensor of a sample, the latter two counted from 0 in the shot. The shot is given as itself,
+    or as the root of a data set and the shot's key.
     """
 
     instant: int
@@ -170,8 +170,8 @@ class Origin:
 
 @dataclass(frozen=True, eq=False)
 class Sample(Shown):
-    """One sensor's picture at one instant: camera, pose, objects and channels. `channels` maps names to arrays (loaded
-    when asked). Imported pictures may have no known camera and pose; these have an `image_size`.
+    """One sensor's picture at one instant: camera, pose, objects and channels. `channels` maps names to arrays, loaded on
+    access. Imported pictures may have no known camera and pose; these have an `image_size`.
     """
 
     index: int
@@ -184,11 +184,11 @@ class Sample(Shown):
     image_size: tuple[int, int] | None = None  # (width, height) in pixels, if the camera is not known
     source: Mapping[str, Any] | None = None  # the imported data set's entry of the picture
     sequence: str = ""  # empty for still pictures
-    variation: str = ""  # of a recipe with variations, under which of them it is
+    variation: str = ""  # the variation, if the recipe has variations
     sensor: str = CAMERA
     instant: int = 0  # counted from 0 in the sequence, or, for still pictures, in the data set
     time: float = 0.0  # seconds from the sequence's first instant
-    origin: Origin | None = None  # None: nobody knows what was there
+    origin: Origin | None = None  # None: unknown
     requested: tuple[str, ...] = ()  # labels of objects and of pictures that were asked for
     extra: Mapping[str, Any] = field(default_factory=dict[str, Any])  # fields of labels of pictures
     options: Mapping[str, Mapping[str, Any]] = field(default_factory=dict[str, Mapping[str, Any]])  # those of labels
@@ -225,9 +225,9 @@ class Sample(Shown):
 
     @property
     def picture(self) -> NDArray[np.uint8]:
-        """The colours, (H, W, 3), or (H, W, 4) where only the picture without its background is kept.
+        """The colours, (H, W, 3), or (H, W, 4) if only the picture without its background is stored.
 
-        Raises AttributeError where neither picture is kept.
+        Raises AttributeError if neither picture is stored.
         """
         return getattr(self, picture_of(self.channels) or "rgb")
 
@@ -239,7 +239,7 @@ class Sample(Shown):
     def point_cloud(self, axes: Axes = "camera", surface: Surface = "visible") -> PointCloud:
         """Return the picture's visible points, or the points of `surface_samples`, in the axes of the camera or the world.
 
-        The cloud has colours, objects, categories and normals as far as channels are kept. Any lens is supported.
+        The cloud has colours, objects, categories and normals if their channels are stored. Any lens is supported.
 
         surface `visible`: a point for each pixel that shows a surface, row by row, by `depth_ray`, else by `depth`. surface
         `complete`: the points of `surface_samples` on all objects, visible or not, without colours. Raises StoreError where
@@ -251,8 +251,8 @@ class Sample(Shown):
 
     @property
     def voxel_grid(self) -> VoxelGrid:
-        """The cells of the channel `voxels` as arrays. Raises StoreError where it is not kept, or is not of the grid that the
-        recipe asks for.
+        """The cells of the channel `voxels` as arrays. Raises StoreError if it is not stored, or has another grid than the
+        recipe's.
         """
         from viewsphere.model.annotations.voxels import Grid, VoxelGrid, Voxels
 

@@ -1,4 +1,4 @@
-"""A concrete scene: its lights, what the targets stand on, and how light becomes a picture. Nothing random left.
+"""A concrete scene, without random values: its lights, its ground, and the steps from light to a picture.
 
 Light has one unit: a white Lambert surface that receives an irradiance of pi has a radiance of 1.
 """
@@ -16,7 +16,7 @@ from viewsphere.model.fields.omit_none import OmitNone
 from viewsphere.model.weather import Fog, Lamps, Rain, Snow, Wet
 
 WEATHER = ("fog", "rain", "snow", "wet", "lamps")
-"""Fields of a scene that say what its weather is, and that its lamps are lit."""
+"""Fields of a scene that describe its weather and its lit lamps."""
 
 Vector = tuple[float, float, float]
 Row = tuple[float, float, float, float]
@@ -25,7 +25,7 @@ IDENTITY: Matrix4 = ((1.0, 0.0, 0.0, 0.0), (0.0, 1.0, 0.0, 0.0), (0.0, 0.0, 1.0,
 Position = tuple[Metres, Metres, Metres]
 
 LINEAR, SRGB, PICTURE = "linear", "sRGB", "picture"
-"""Say of a field what kind of colour it is, or that it names a file: recipes have short forms for these."""
+"""Markers of fields that hold a kind of colour or a file name: recipes have short forms for these."""
 
 Color = Annotated[tuple[Amount, Amount, Amount], LINEAR]
 Srgb = Annotated[tuple[Portion, Portion, Portion], SRGB]
@@ -34,7 +34,7 @@ WHITE: Color = (1.0, 1.0, 1.0)
 
 
 class Sun(Frozen):
-    """A distant light. Azimuth and elevation are those of the direction it stands in, as for cameras."""
+    """A distant light. Azimuth and elevation give the direction towards it, as for cameras."""
 
     azimuth: Number = Field(default=40.0, description="azimuth, degrees, as for cameras")
     elevation: float = Field(default=50.0, gt=0, le=90, description="degrees above the horizon")
@@ -54,7 +54,7 @@ class Sky(Frozen):
 
 
 class Daylight(Frozen):
-    """The sky that the sun's place makes, clear to overcast; the sun itself is dimmed and coloured by its air."""
+    """A sky that follows from the sun's position, clear to overcast; its air dims and colours the sun."""
 
     IS_CHOICE = True
     kind: Literal["daylight"] = Field(default="daylight", description="a sky computed from the sun's position")
@@ -64,7 +64,7 @@ class Daylight(Frozen):
 
 
 class Environment(Frozen):
-    """Light from everywhere, from a picture of the whole sphere (equirectangular EXR or HDR, linear)."""
+    """Light from all directions, from a picture of the whole sphere (equirectangular EXR or HDR, linear)."""
 
     IS_CHOICE = True
     kind: Literal["hdri"] = Field(default="hdri", description="a picture of the whole sphere")
@@ -84,19 +84,19 @@ class Light(Frozen):
 
 
 class PlacedLight(Light):
-    """A lamp that stands somewhere, in world axes."""
+    """A lamp with a position, in world axes."""
 
     position: Position = Field(description="[x, y, z] in metres from the centre of the targets' box")
 
 
 class AimedLight(PlacedLight):
-    """A lamp that points somewhere: two places give the direction."""
+    """A lamp with a direction, given by two positions."""
 
     toward: Position = Field(default=(0.0, 0.0, 0.0), description="target, [x, y, z] as for position")
 
 
 class PointLight(PlacedLight):
-    """A small ball that shines everywhere."""
+    """A small ball that shines in all directions."""
 
     IS_CHOICE = True
     kind: Literal["point"] = Field(default="point", description="a small ball that shines everywhere")
@@ -114,7 +114,7 @@ class SpotLight(AimedLight):
 
 
 class AreaLight(AimedLight):
-    """A rectangle that shines to one side, towards `toward`, as Lambert says; its width lies level."""
+    """A rectangle that shines to one side, towards `toward`, by Lambert's law; its width is horizontal."""
 
     IS_CHOICE = True
     kind: Literal["area"] = Field(default="area", description="a rectangle that shines to one side")
@@ -122,7 +122,7 @@ class AreaLight(AimedLight):
 
 
 class HemisphereLight(Light):
-    """Even light from above and another from below: radiance `strength` times each colour. It casts no shadow."""
+    """Uniform light from above and another from below: radiance `strength` times each colour. It casts no shadow."""
 
     IS_CHOICE = True
     kind: Literal["hemisphere"] = Field(default="hemisphere", description="even light from above, and another from below")
@@ -135,7 +135,7 @@ AnyLight = Annotated[PointLight | SpotLight | AreaLight | HemisphereLight, Field
 class Ground(OmitNone):
     """An endless level plane at the lowest point of all that is placed.
 
-    A catcher shows nothing but the shadows and the occlusion it receives, and is not there for labels unless `labels` says so.
+    A catcher shows only the shadows and the occlusion that it receives; labels ignore it unless `labels` is set.
     """
 
     color: Srgb = Field(
@@ -158,21 +158,21 @@ class Ground(OmitNone):
 
     @property
     def has_slabs(self) -> bool:
-        """Return whether slabs are seen."""
+        """Return whether slabs are visible."""
         pictured = self.image or self.roughness_image or self.normal_image or self.material
         return self.pattern == "slabs" and not (pictured or self.catcher)
 
     @property
     def is_labelled(self) -> bool:
-        """Return whether labels see the ground."""
+        """Return whether labels include the ground."""
         return self.labels or not self.catcher
 
 
 class Background(Frozen):
-    """The picture behind all surfaces: a plain colour, an image, else the sky.
+    """The picture behind all surfaces: a plain colour, an image, or by default the sky.
 
-    cover: the largest centred part with the frame's proportions; stretch: all of it; crop: a part of the frame's
-    proportions, `zoom` times smaller than the largest, at `place` (x, y) of the room there is.
+    cover: the largest centred part with the frame's proportions; stretch: all of it; crop: a part of the frame's proportions,
+    `zoom` times smaller than the largest, at `place` (x, y), as shares of the remaining room.
     """
 
     color: Srgb | None = Field(default=None, description="a plain colour: sRGB [r, g, b]")
@@ -193,7 +193,7 @@ class Background(Frozen):
 
 
 class ViewTransform(Frozen):
-    """From scene-linear light to display-linear: stops of exposure, the light that shall look white, a view transform."""
+    """The conversion of scene-linear to display-linear light: exposure in stops, the white point, a view transform."""
 
     exposure: float = Field(default=0.0, ge=-16, le=16, description="stops: 1 is twice as bright")
     temperature_k: float = Field(
@@ -237,7 +237,7 @@ class Effects(Frozen):
 
 
 class Finish(Frozen):
-    """The steps from light to a picture: all that need no new stage, so every frame may have its own."""
+    """The steps from light to a picture that need no new stage, so that every frame may have its own."""
 
     background: Background = Background.of_defaults()
     smoother: Smoother = Smoother.of_defaults()
@@ -253,7 +253,7 @@ class Finish(Frozen):
 
 
 class BlendScene(Frozen):
-    """A .blend file whose scene is rendered as it is; what of it is labelled are things of the shot.
+    """A .blend file whose scene is rendered unchanged; its labelled objects are things of the shot.
 
     `world_from_file` is rigid and in metres on both sides; `unit` is the metres in one unit of the file. `shown` are objects
     that are rendered although the file hides them, `hidden` those that are not. Without light of its own (`is_lit`) the
@@ -267,7 +267,7 @@ class BlendScene(Frozen):
     hidden: tuple[str, ...] = ()
     is_lit: bool = True
     frame: int | None = None  # the file's; None: its first
-    confined: bool = True  # textures and libraries may not lie outside of its folder
+    confined: bool = True  # textures and libraries must be inside its folder
 
 
 class Floor(Frozen):
@@ -277,7 +277,7 @@ class Floor(Frozen):
     is_fixed: bool = False
 
     def under(self, lowest: float) -> float:
-        """The ground's height where the lowest point of all that is placed has this height."""
+        """The ground's height, given the height of the lowest placed point."""
         return self.height if self.is_fixed else min(self.height, lowest)
 
 
@@ -289,9 +289,9 @@ class Scene(Frozen):
     """Light, ground, finish and weather; None for `sun`, `ground` or weather means there is none. `blend` has its own light and
     ground.
 
-    `floor`: how high the ground is; a number alone is the most. Without one the ground lies below all that is placed, at any
-    instant of the shot; where what moves is cut into several shots, it has one height only by a floor. `fog_outdoors`, in place
-    of `fog`: beyond the windows of a room; only sky and ground, which are outdoors, are seen through it.
+    `floor`: the height of the ground; a plain number is the largest height. Without it, the ground is below everything placed,
+    at all instants of the shot. A moving sequence that is split into several shots needs a floor for one common height.
+    `fog_outdoors` replaces `fog`: it is fog beyond the windows of a room, in front of sky and ground only.
     """
 
     sun: Sun | None = Sun.of_defaults()
@@ -310,5 +310,5 @@ class Scene(Frozen):
 
     @property
     def weather(self) -> bool:
-        """Return whether there is any."""
+        """Return whether the scene has any weather."""
         return any(getattr(self, name) is not None for name in (*WEATHER, "fog_outdoors") if name != "lamps")

@@ -1,4 +1,4 @@
-"""Shards of what there is to do: which each has follows from their numbers alone."""
+"""Shards of the work: the items of each shard follow from its numbers alone."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ T = TypeVar("T")
 
 @dataclass(frozen=True)
 class Shard:
-    """Every `of`-th of some things, from the `number`-th on, counted from 0: shards together have each of them once."""
+    """Every `of`-th item of a sequence, from the `number`-th on, counted from 0: together, the shards have each item once."""
 
     number: int = 0
     of: int = 1
@@ -22,23 +22,23 @@ class Shard:
 
     @property
     def is_all(self) -> bool:
-        """Return whether it has all of them."""
+        """Return whether the shard has all items."""
         return self.of == 1
 
     def __call__(self, things: Iterable[T]) -> Iterator[T]:
-        """This shard of them, in their order."""
+        """The items of this shard, in order."""
         return islice(things, self.number, None, self.of)
 
     def has(self, number: int) -> bool:
-        """Return whether the thing of this number, counted from 0, is in it."""
+        """Return whether the shard has the item of this number, counted from 0."""
         return number % self.of == self.number
 
     def nth(self, place: int) -> int:
-        """The number of the thing that is at this place in it."""
+        """The number of the item at this place in the shard."""
         return self.number + place * self.of
 
     def next(self, number: int) -> int:
-        """The number of the first thing in it that is not before this one."""
+        """The smallest number in the shard that is at least `number`."""
         return number + (self.number - number) % self.of
 
     def size(self, count: int) -> int:
@@ -51,4 +51,4 @@ class Shard:
 
 
 ALL = Shard()
-"""The one shard that has everything."""
+"""The shard that has all items."""

@@ -1,4 +1,4 @@
-"""A shot: one concrete world and everything that is recorded of it, nothing random left. Plain JSON."""
+"""A shot: one concrete world without random values, and everything that is recorded in it. Plain JSON."""
 
 from __future__ import annotations
 
@@ -24,12 +24,12 @@ from viewsphere.model.thing import Motion, Thing
 class Shot(Frozen):
     """Things, a rig, instants and a scene: all an engine needs. It is the unit of work, of resuming and of distribution.
 
-    A sample is one sensor's picture at one recorded instant: those of an instant follow one another in the rig's order, and
-    `first` is the number of the first one in the data set. Instants ascend by their indices.
+    A sample is one sensor's picture at one recorded instant. The samples of an instant are in the rig's order; `first` is the
+    number of the first sample in the data set. Instants ascend by their indices.
 
-    Where `shutter` is not 0, pictures show all that is there while the shutter is open, for this share of the time between two
-    instants with the instant in the middle, and `exposures`, one an instant, say how things move then. Labels are those of
-    the instant.
+    `shutter` is the time for which the shutter is open, centred on the instant, as a share of the time between two instants. If
+    it is not 0, pictures show everything during this time, and `exposures`, one an instant, hold the motions. Labels always
+    show the instant itself.
     """
 
     key: str  # stable, unique, fit for a folder's name
@@ -38,9 +38,9 @@ class Shot(Frozen):
     instants: tuple[Instant, ...]
     scene: Scene
     first: int = 0
-    redraw: int = 0  # how often what the scene leaves to chance was drawn again until all fitted
+    redraw: int = 0  # how often the scene's random values were drawn again until everything fitted
     sequence: str = ""  # of still pictures none
-    variation: str = ""  # of the recipe's variations, under which it is rendered; it ends the sequence's name
+    variation: str = ""  # the recipe's variation under which it is rendered; it ends the sequence's name
     tracks: Tracks | None = None
     engine: str = "raster"
     engine_options: dict[str, JsonValue] = Field(default_factory=dict)
@@ -85,8 +85,8 @@ class Shot(Frozen):
 
     @property
     def subject(self) -> str:
-        """The stable name of the model or scene that it shows, without its variation. The rest of its key says where its frames
-        are stored: that differs where a data set is rendered in parts, or in shots of other lengths.
+        """The stable name of the shown model or scene, without its variation. The rest of the shot's key determines where its
+        frames are stored; it depends on the parts of the data set and on the length of shots.
         """
         subject = self.key.rpartition("-")[0]
         return subject.removesuffix(f"-{self.variation}") if self.variation else subject
@@ -109,15 +109,15 @@ class Shot(Frozen):
             yield self.first + place, instant, sensor
 
     def instant_after(self, instant: int, offset: int) -> int | None:
-        """The instant so many after another one (before it, where negative), both counted from 0 in the shot, None where the
-        shot does not have it.
+        """The instant at an `offset` from another one (earlier if negative), both counted from 0 in the shot; None if the shot
+        does not have it.
         """
         wanted = self.instants[instant].index + offset
         place = bisect_left(self.instants, wanted, key=lambda one: one.index)
         return place if place < len(self.instants) and self.instants[place].index == wanted else None
 
     def things_at(self, instant: int) -> tuple[Thing, ...]:
-        """Return the things as they are at an instant, counted from 0 in the shot: standing still there, or not there."""
+        """Return the things as they are at an instant, counted from 0 in the shot: as still things, or absent."""
         return tuple(thing.at(instant) for thing in self.things)
 
     def poses_at(self, instant: int) -> tuple[Motion, ...]:
@@ -137,8 +137,8 @@ class Shot(Frozen):
         return Camera(self._lens(instant, sensor), rotation, -transform(rotation, world_from_sensor[:3, 3]))
 
     def viewpoint(self, instant: int, sensor: int = 0) -> Viewpoint | None:
-        """The viewpoint of a sensor at an instant, both counted from 0: as the instant's pose was asked for, of the rig's first
-        sensor; of one that is mounted elsewhere, as it follows from there.
+        """The viewpoint of a sensor at an instant, both counted from 0. The rig's first sensor has the instant's requested
+        viewpoint; for a sensor mounted elsewhere, it is computed from its pose.
         """
         now, mounted = self.instants[instant], self.rig.sensors[sensor]
         if now.viewpoint is None or mounted.rig_from_sensor == IDENTITY:
@@ -155,7 +155,7 @@ class Shot(Frozen):
         return self.rig.sensors[sensor].kept(self.channels)
 
     def things_during(self, instant: int, moment: float) -> tuple[Thing, ...]:
-        """Return the things a moment (see `Sweep`) after an instant, while the shutter is open, standing still there.
+        """Return the things at a moment (see `Sweep`) after an instant, while the shutter is open, as still things.
 
         Between two time steps, they show the nearer one.
         """
@@ -166,7 +166,7 @@ class Shot(Frozen):
         )
 
     def camera_during(self, instant: int, moment: float, sensor: int = 0) -> Camera:
-        """The camera of a sensor a moment after an instant while the shutter is open."""
+        """The camera of a sensor at a moment after an instant, while the shutter is open."""
         exposure, now = self.exposures[instant], self.instants[instant]
         pose = exposure.rig.pose(moment) if exposure and exposure.rig else now.world_from_rig
         then = now.model_copy(update={"world_from_rig": pose})

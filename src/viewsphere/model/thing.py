@@ -1,4 +1,4 @@
-"""A thing: a model, where it is at each instant, and how its materials are changed."""
+"""A thing: a model, its pose at each instant, and the changes to its materials."""
 
 from __future__ import annotations
 
@@ -13,7 +13,9 @@ from viewsphere.model.scene import IDENTITY, Color, Matrix4, Picture
 
 
 class Repaint(OmitNone):
-    """A change to the materials whose names match `material`, a pattern of fnmatch. What is None stays as the file says."""
+    """A change to the materials whose names match `material`, a pattern of fnmatch. Fields that are None leave the file's
+    values unchanged.
+    """
 
     OMIT_IF_NONE = ("image", "texture")
 
@@ -28,7 +30,7 @@ class Repaint(OmitNone):
 class TimeStep(Frozen):
     """A time step of an animated model: a frame of its file, and the seconds since that file's first frame.
 
-    `file_from_axes`: where the rigid axes of the parts are then that are taken of the model; None: where `Parts` says.
+    `file_from_axes`: the rigid axes of the model's kept parts at this time; None: the axes given in `Parts`.
     """
 
     frame: int
@@ -37,7 +39,7 @@ class TimeStep(Frozen):
 
 
 class Motion(Frozen):
-    """The place of a thing, and the time step of its file that it shows.
+    """The pose of a thing, and the time step of its file that it shows.
 
     `poses` has one rigid pose (world from object) for all instants of a shot, or one an instant, None where the thing is not
     there. `steps` has one time step for all instants, or one an instant, None for a model at rest. A thing of a sequence with
@@ -50,7 +52,7 @@ class Motion(Frozen):
 
     @property
     def is_still(self) -> bool:
-        """Return whether one pose is for all instants, and no time step is shown."""
+        """Return whether the thing has one pose for all instants, and shows no time step."""
         return len(self.poses) == 1 and self.steps == (None,) and not self.moves
 
     def at(self, instant: int) -> Matrix4 | None:
@@ -62,24 +64,24 @@ class Motion(Frozen):
         return self.steps[0 if len(self.steps) == 1 else instant]
 
     def held(self, instant: int) -> Motion:
-        """The motion of what stays as it is at an instant, counted from 0 in the shot."""
+        """A still motion with the pose and time step of an instant, counted from 0 in the shot."""
         return self if self.is_still else Motion(poses=(self.at(instant),), steps=(self.step_at(instant),))
 
     def lasts(self, instants: int) -> bool:
-        """Return whether it says where a thing is, and what it shows, at so many instants."""
+        """Return whether the motion has poses and time steps for this number of instants."""
         return {len(self.poses), len(self.steps)} <= {1, instants}
 
     @staticmethod
     def still(world_from_object: Matrix4, step: TimeStep | None = None) -> Motion:
-        """The motion of what stands still, and shows one time step."""
+        """The motion of a still thing that shows one time step."""
         return Motion(poses=(world_from_object,), steps=(step,))
 
 
 class Thing(Frozen):
     """One thing of a scene: an object with an id of 1..N, or with id 0 scenery that is background to every label.
 
-    An object's id is the same at all instants of a sequence. Things of one model are instances. `scenery` marks what the
-    targets stand in front of, labelled or not.
+    An object's id is the same at all instants of a sequence. Things of one model are instances. `scenery` marks the
+    surroundings of the targets, labelled or not.
     """
 
     id: int = Field(ge=0)
@@ -90,22 +92,22 @@ class Thing(Frozen):
 
     @property
     def is_target(self) -> bool:
-        """Return whether it is an object that pictures are about, no scenery."""
+        """Return whether it is a subject of the pictures: an object that is not scenery."""
         return bool(self.id) and not self.scenery
 
     @property
     def is_there(self) -> bool:
-        """Return whether a still thing is there at all; of a moving one, whether it is at first."""
+        """Return whether the thing is present, for a moving thing at its first instant."""
         return self.motion.poses[0] is not None
 
     @property
     def key(self) -> str:
-        """The key of its model, as a still thing shows it, or a moving one at first."""
+        """The key of its model at the shown time step, for a moving thing at its first instant."""
         return self.model.key_at(self.step and self.step.frame)
 
     @property
     def step(self) -> TimeStep | None:
-        """The time step that a still thing shows, a moving one at first."""
+        """The time step that the thing shows, for a moving thing at its first instant."""
         return self.motion.steps[0]
 
     @property
@@ -114,14 +116,14 @@ class Thing(Frozen):
         return self if self.step is None else self.model_copy(update={"motion": Motion(poses=self.motion.poses)})
 
     def showing(self, step: TimeStep) -> Thing:
-        """The thing where it stands, at one time step of its model's file."""
+        """The thing at its pose, at one time step of its model's file."""
         return self.model_copy(update={"motion": Motion(poses=self.motion.poses, steps=(step,))})
 
     def at(self, instant: int) -> Thing:
-        """The thing as it is at an instant, counted from 0 in the shot: standing still there, or not there."""
+        """The thing as it is at an instant, counted from 0 in the shot: as a still thing, or absent."""
         return self if self.motion.is_still else self.model_copy(update={"motion": self.motion.held(instant)})
 
     @property
     def world_from_object(self) -> Matrix4:
-        """The pose of a still thing, of a moving one its first; the identity where the thing is not there."""
+        """The pose of a still thing, or the first pose of a moving one; the identity where the thing is absent."""
         return self.motion.poses[0] or IDENTITY

@@ -1,6 +1,4 @@
-"""The concrete weather of a scene: what lies in the air between things and the camera, what falls, what water lies, and whether
-lamps are lit.
-"""
+"""The concrete weather of a scene: fog, rain, snow, wet surfaces, and lit lamps."""
 
 from __future__ import annotations
 
@@ -21,9 +19,10 @@ CONTRAST = 3.912
 
 
 class Fog(Frozen):
-    """Air that scatters: light from a thing falls by e to the -`extinction` times its range, and the air's own takes its place.
+    """Air that scatters light: it multiplies light from a thing by exp(-`extinction` * range), and adds its own light for the
+    rest.
 
-    With a `height` the air is as said at z = 0, and e times clearer every so many metres above.
+    With a `height`, the values hold at z = 0, and the extinction falls by a factor of e for each `height` metres above.
     """
 
     visibility: Annotated[float, Field(strict=True, gt=0, le=1e6)] = Field(
@@ -51,17 +50,17 @@ class Falling(Frozen):
 
 
 class Rain(Falling):
-    """Drops by Marshall and Palmer 1948, as fast as Garg and Nayar 2007 have them."""
+    """Drop sizes by Marshall and Palmer (1948), speeds by Garg and Nayar (2007)."""
 
     exposure: Exposed = Field(default=0.004, description="exposure time in seconds; longer gives longer streaks")
 
 
 class Snow(Falling):
-    """Flakes by Gunn and Marshall 1958, which drift down at about a metre a second."""
+    """Flake sizes by Gunn and Marshall (1958), which fall at about a metre a second."""
 
 
 class Wet(Frozen):
-    """Water on what faces up, and in hollows of the ground."""
+    """Water on surfaces that face up, and in hollows of the ground."""
 
     amount: Portion = Field(default=1.0, description="0 dry, 1 soaked: darker, with a reflecting film")
     puddles: Portion = Field(default=0.3, description="share of level ground under water")
@@ -69,7 +68,7 @@ class Wet(Frozen):
 
 
 class Lamps(Frozen):
-    """Lamps of a place that are lit: its pieces' parts named lens."""
+    """Lit lamps of a place: the parts named lens of its pieces."""
 
     strength: Amount = Field(default=90.0, description="irradiance at one metre below each")
     color: Light = Field(default=(1.0, 0.74, 0.46), description="linear [r, g, b]")

@@ -1,4 +1,4 @@
-"""Animations of files that models play in sequences: when each begins and ends, and which of its frames are shown."""
+"""The animations that models play in sequences: the beginning, the end and the shown frames of each."""
 
 from __future__ import annotations
 
@@ -25,10 +25,10 @@ if TYPE_CHECKING:
 def with_clips(
     recipe: Recipe, models: Sequence[tuple[ModelSpec, int]]
 ) -> tuple[tuple[ModelSpec, ...], tuple[Timeline | None, ...]]:
-    """The models as at the first frame of the animation that each plays, and when that is; None of those that play none.
-    `models` are specifications with the number of their entry.
+    """The models at the first frame of their animation, with the animation's timeline; None for models without one. `models`
+    are specifications with the number of their entry.
 
-    Raises RecipeError for files that cannot be read, and for those in which nothing moves, all together.
+    Raises one RecipeError for all files that are unreadable or contain no movement.
     """
     from viewsphere.assets.animation.timeline import Blenders  # which loads readers of models
 
@@ -45,16 +45,14 @@ def with_clips(
 
 
 def playing(recipe: Recipe, number: int) -> tuple[tuple[str, Motions | None], ...]:
-    """The motions that models of an entry may have, with their fields: their own, and those of distractors."""
+    """The possible motions of an entry's models, with their fields: the entry's own, and those of distractors."""
     company = recipe.scene.company
     motions = (f"models[{number}].motion", recipe.models[number].motion)
     return (motions,) if company is None else (motions, ("scene.company.motion", company.motion))
 
 
 def shown_steps(recipe: Recipe, number: int, spec: ModelSpec, line: Timeline) -> tuple[TimeStep, ...]:
-    """The time steps that may be shown of a model in any sequence, ascending: all frames of its animation where what is shown
-    is drawn.
-    """
+    """The time steps of a model that any sequence may show, ascending: all frames of its animation if the choice is random."""
     assert recipe.time is not None
     steps: dict[int, TimeStep] = {}
     for field, motions in playing(recipe, number):
@@ -67,7 +65,7 @@ def shown_steps(recipe: Recipe, number: int, spec: ModelSpec, line: Timeline) ->
 
 
 def _played(clips: tuple[MotionEntry, ...], spec: ModelSpec, line: Timeline, time: TimeEntry, field: str) -> list[TimeStep]:
-    """The time steps that are shown at all instants, and just before and after, which blurred pictures show."""
+    """The time steps at all instants, and just before and after them, which blurred pictures show."""
     around = range(-1, time.count + 1) if time.shutter else range(time.count)
     start = Start(IDENTITY, spec, time.seconds_at(time.count - 1), lambda *names: generator(0, *names))
     there = tuple(entry.model_copy(update={"enter": None, "leave": None}) for entry in clips)

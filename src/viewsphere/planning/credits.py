@@ -19,7 +19,7 @@ from viewsphere.validation.errors import report, shown
 from viewsphere.validation.quantity import first_few, quantity
 
 TABLE = "credits.csv"
-"""Name of the table in a folder of models: its column `file` has names of files, and patterns, of which the first counts."""
+"""Name of the table in a folder of models: its column `file` holds names and patterns of files; the first match is used."""
 
 COLUMNS = ("file", *Credit.model_fields)
 
@@ -28,9 +28,9 @@ Table = Mapping[str, Credit]
 
 
 def credits_of(specs: Iterable[ModelSpec], said: Mapping[str, Credit]) -> dict[str, Credit]:
-    """The credits that are known of models, by their keys; `said` are those of recipes' entries, by the models' keys.
+    """The known credits of models, by their keys; `said` holds the credits from recipes' entries, by the models' keys.
 
-    Raises RecipeError, which names file and line, for a table that cannot be used.
+    Raises RecipeError, which names file and line, for an invalid table.
     """
     table, source = cache(_read), cache(_source)
     credits = {spec.key: said.get(spec.key) or _looked_up(spec, table, source) for spec in specs}
@@ -60,7 +60,7 @@ def _source(prefix: str) -> Named | None:
 
 
 def _read(folder: Path, confined: bool) -> Table:
-    """The table in a folder of models; empty where there is none."""
+    """The table in a folder of models; empty if there is none."""
     path, found = folder / TABLE, dict[str, Credit]()
     if not path.exists():
         return found

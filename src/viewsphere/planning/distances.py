@@ -26,16 +26,19 @@ from viewsphere.planning.samplers import Standing
 Float = NDArray[np.float64]
 
 MOST_CAMERAS = 20_000
-"""Poses of a model that are looked at beforehand, evenly over all; the others are when their shot is rendered."""
+"""Number of poses of a model that are checked before rendering, evenly spaced; the others are checked when their shot is
+rendered.
+"""
 
 MOST_RIGS = 1000
-"""Poses of a model for which all sensors of a rig are looked at beforehand, evenly over all."""
+"""Number of poses of a model for which all sensors of a rig are checked before rendering, evenly spaced."""
 
 MOST_PAIRS = 1_000_000
-"""Likewise of all models together."""
+"""The same number for all models together."""
 
 MOST_DRAWS = 20_000
-"""Likewise where each model has random poses of its own: a draw takes some 40 microseconds, so that all take about a second."""
+"""The same number if each model has its own random poses: a draw takes some 40 microseconds, so that all take about a second.
+"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,10 +50,10 @@ class Distances:
     _offsets: dict[range, tuple[Float, Float]] = field(default_factory=dict[range, tuple[Float, Float]])
 
     def problem(self, subject: str) -> RecipeError | None:
-        """The first pose whose camera would stand inside an object's box, in words; None if there is none.
+        """An error for the first pose with its camera inside an object's box; None if there is none.
 
-        Cameras that can be drawn again are left to their shots, and so are draws for each frame and distances by a share of the
-        picture. Room for all objects is looked for in any case.
+        Not checked here, but with their shots: cameras that can be redrawn, draws for each frame, and distances by a share of
+        the picture. The search for room for all objects always runs.
         """
         subject = self.plan.world(subject)
         for there in self.plan.standing(subject, self.box_of):
@@ -72,7 +75,7 @@ class Distances:
         return None
 
     def _of_other_sensors(self, there: Standing, poses: Sequence[int], subject: str) -> RecipeError | None:
-        """The first pose at which a sensor that is not the rig's first one would stand inside an object's box."""
+        """An error for the first pose with another sensor than the rig's first inside an object's box."""
         others = self.plan.rig.sensors[1:]
         if not others:
             return None
@@ -116,7 +119,7 @@ class Distances:
         return np.array([_stand(self.plan.viewpoint(subject, views[i], (x, y, z))) for i in poses])
 
     def _stand(self, poses: Sequence[int], views: Poses) -> tuple[Float, Float]:
-        """From what the cameras look at to where they stand, and what they look at: NaN where that is the models' centre."""
+        """The offsets from the cameras' targets to the cameras, and the targets: NaN for the models' centre."""
         if views is not self.plan.pose_list or not isinstance(poses, range):
             return _standing(poses, views)
         if poses not in self._offsets:

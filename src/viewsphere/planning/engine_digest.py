@@ -1,4 +1,4 @@
-"""The digest of an engine's program, on which the look of pictures depends beside the recipe."""
+"""The digest of an engine's program, which determines the pictures together with the recipe."""
 
 from __future__ import annotations
 
@@ -22,8 +22,8 @@ def engine_digest(name: str) -> str:
     """A digest of the sources of the engine of this name, of the programs it runs (its `programs`), and of what
     all engines share.
 
-    Two states of a program may carry one version, but only equal sources surely paint alike. Raises UserError for an engine
-    that is not there.
+    Versions of a program may share a version number, but only equal sources guarantee equal pictures. Raises UserError for an
+    unknown engine.
     """
     engine, file = plugins.load(EngineSpec, name), plugins.module_file("engines", name)
     own = [] if file is None else [file.parent if file.name == "__init__.py" else file]
@@ -35,14 +35,14 @@ def engine_digest(name: str) -> str:
 
 
 def engine_options(recipe: Recipe) -> dict[str, JsonValue]:
-    """The options of a recipe's engine; the path of a `script` counts from the recipe's folder."""
+    """The options of a recipe's engine; the path of a `script` is relative to the recipe's folder."""
     options = recipe.engine.options
     script = options.get("script")
     return options | {"script": str(recipe.folder / Path(script).expanduser())} if isinstance(script, str) else options
 
 
 def script_digest(recipe: Recipe) -> str | None:
-    """SHA-256 of the engine's script, on which its pictures depend; None without one, and where it is not there."""
+    """SHA-256 of the engine's script, which affects its pictures; None without a script, or if the file is missing."""
     script = engine_options(recipe).get("script")
     if not isinstance(script, str) or not Path(script).is_file():
         return None

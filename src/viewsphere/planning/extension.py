@@ -1,7 +1,8 @@
-"""Parts of a data set: what a recipe adds to the frames that are there, and how its plan renders them.
+"""Parts of a data set: the frames that a recipe adds to the existing ones, and their rendering by its plan.
 
-A frame is known by its model's key and its pose; a pose by its name and where the camera stands. A part holds models x poses
-of its recipe less what earlier parts hold. Poses, frames, categories and models are numbered on; nothing is renumbered.
+A frame is identified by its model's key and its pose, and a pose by its name and the camera's position. A part holds the models
+x poses of its recipe without those of earlier parts. New poses, frames, categories and models continue the numbering; nothing
+is renumbered.
 """
 
 from __future__ import annotations
@@ -46,9 +47,9 @@ from viewsphere.store.index import Index, Ranges, numbers
 
 @dataclass(frozen=True, eq=False)
 class DatasetPart(Sendable):
-    """A part of a data set, and the plan of its recipe, which renders it. `record` is the whole data set's.
+    """A part of a data set, and the plan of its recipe, which renders it. `record` describes the whole data set.
 
-    A run may have a `shard` of it: every n-th shot of each index, whatever is there already.
+    A run may have a `shard` of it: every n-th shot of each index, finished or not.
     """
 
     plan: Plan
@@ -63,11 +64,11 @@ class DatasetPart(Sendable):
 
     @property
     def adds_nothing(self) -> bool:
-        """Return whether all that its recipe asks for was there before."""
+        """Return whether the data set had everything in the recipe before."""
         return not self.part.frames and not self.part.supplies
 
     def remembering(self, store: Store) -> DatasetPart:
-        """The same portion, which keeps in the store what is simulated for it."""
+        """The same part, which keeps its simulation results in the store."""
         from viewsphere.store import Simulated  # which loads what reads stores
 
         return replace(self, plan=self.plan.changed(memory=Simulated(store.root)))
@@ -84,8 +85,8 @@ class DatasetPart(Sendable):
 
     @cached_property
     def models(self) -> tuple[tuple[ModelSpec, tuple[TimeStep, ...]], ...]:
-        """The models that the recipe keeps, with the data set's numbers of their categories, and their time steps; of a share
-        those that its shots need, and its shard of all, so that shards together have every model.
+        """The recipe's kept models, with the data set's category numbers, and their time steps. A shard has the models of its
+        shots and its shard of all models, so that the shards together have every model.
         """
         kept = enumerate(self.plan.kept_specs)
         specs = (spec for i, spec in kept if self.shard.is_all or self.shard.has(i) or spec.key in self._needed)
@@ -93,7 +94,7 @@ class DatasetPart(Sendable):
 
     @cached_property
     def _needed(self) -> frozenset[str]:
-        """Keys of the models that may be in the shots; no more of these are looked at than it takes to find all models."""
+        """Keys of the models that may be in the shots; the search stops once all models are found."""
         around = () if self.plan.composition is None else self.plan.composition.models
         needed, every = {spec.key for spec in around}, {spec.key for spec in self.plan.kept_specs}
         for row in self._told_apart:
@@ -104,7 +105,7 @@ class DatasetPart(Sendable):
 
     @property
     def _told_apart(self) -> Iterator[Row]:
-        """The shots, but for those that show the same models as another."""
+        """The shots, without those that show the same models as another shot."""
         if self.plan.recipe.scene.is_moved_each_frame:
             return self.rows
         return (next(index.rows_of(subject)) for index in self.indices for subject, shots in index.counts.items() if shots)
@@ -131,7 +132,7 @@ class DatasetPart(Sendable):
         return next((row for row in (index.find(key) for index in self.indices) if row is not None), None)
 
     def cast(self, row: Row) -> tuple[ModelSpec, ...]:
-        """The recipe's models in a shot, that of its frames first."""
+        """The recipe's models in a shot, the frames' own model first."""
         return self.plan.cast(row.subject, self._of_recipe(row.positions[0][0]))
 
     def shot(self, row: Row, box_of: BoxOf, redraws: Sequence[int] = (), redraw: int = 0) -> Shot:
@@ -162,7 +163,9 @@ class DatasetPart(Sendable):
 
     @cached_property
     def _recipe_numbers(self) -> Indices | None:
-        """The recipe's number of every pose of the data set, -1 for those that it lacks; None where all are the same."""
+        """The recipe's number of every pose of the data set, -1 for those that the recipe lacks; None if all numbers are
+        equal.
+        """
         if has_poses_of(self.record, self.plan.pose_list):
             return None
         wanted, _ = numbered(self.record, self.plan.pose_list)
@@ -195,7 +198,7 @@ def whole(planned: Plan) -> DatasetPart:
 
 
 def resumed(planned: Plan, there: PlanRecord, number: int) -> DatasetPart:
-    """A part of a data set that this plan began before."""
+    """An earlier part of a data set, resumed with its plan."""
     wanted, _ = numbered(there, planned.pose_list)
     return DatasetPart(planned.keeping(_splits(there.parts[:number]), wanted), there, number)
 
@@ -203,7 +206,7 @@ def resumed(planned: Plan, there: PlanRecord, number: int) -> DatasetPart:
 def extend(planned: Plan, there: PlanRecord) -> DatasetPart:
     """Return the additions of a recipe to a data set, as its new last part.
 
-    Raises RecipeError where the recipe's pictures or labels do not fit the existing ones.
+    Raises RecipeError if the recipe's pictures or labels do not fit the existing ones.
     """
     with planned.recipe.located():
         check_fit(planned, there)
@@ -250,12 +253,12 @@ def extend(planned: Plan, there: PlanRecord) -> DatasetPart:
 
 
 def _splits(parts: Sequence[Part]) -> dict[str, str]:
-    """The split of every model, scene or sequence that these parts brought, where splits are by these."""
+    """The split of every model, scene or sequence in these parts, if splits are by one of these."""
     return {key: split for part in parts for key, split in part.dealt_splits.items()}
 
 
 def _categories(planned: Plan, there: PlanRecord) -> tuple[Category, ...]:
-    """The data set's, then the recipe's new ones, numbered on; a category is known by its name."""
+    """The data set's categories, then the recipe's new ones with the next numbers; names identify categories."""
     categories = {category.name: category for category in reversed(there.categories)}  # imported ones may share a name
     added: list[Category] = []
     number = max((category.id for category in there.categories), default=0)
@@ -295,7 +298,7 @@ def _missing(planned: Plan, there: PlanRecord, wanted: Sequence[int]) -> Iterato
 
 
 def _supplies(planned: Plan, there: PlanRecord, wanted: Sequence[int]) -> Iterator[tuple[int, tuple[str, ...]]]:
-    """Channels that frames of earlier parts lack: their part's number, and the channels in the table's order."""
+    """Wanted channels that frames of earlier parts lack: the part's number, and the channels in the table's order."""
     subjects = set(planned.taken)
     for number, part in enumerate(there.parts):
         if not part.is_sampled or not part.frames:
@@ -329,7 +332,7 @@ def _supplies(planned: Plan, there: PlanRecord, wanted: Sequence[int]) -> Iterat
 
 
 def _check_annotations(planned: Plan, part: Part) -> None:
-    """Annotations are computed with their frames, and are not added to those that are there."""
+    """Check that the recipe adds no annotations to existing frames: these are computed with their frames."""
     known = part.recipe.get("annotations", ())
     absent = next((name for name in planned.recipe.annotations if name not in known), None)
     if absent:

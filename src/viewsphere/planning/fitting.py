@@ -22,27 +22,27 @@ RIG = "rig"
 """Name of the setting that only recipes with several sensors have."""
 
 SHOWN = ("min_visibility", "wanted", "empty")
-"""Names of the settings that say what pictures show of their models; only recipes that ask for it have them."""
+"""Names of the settings for the visibility of models in pictures; only recipes with such settings have them."""
 
 LOOK = "the engine's program"
-"""Name of the setting that says how the engine paints."""
+"""Name of the setting for the engine's rendering."""
 
 
 OF = " of "
-"""Separator of a model's field and its key in names of settings; in no other name."""
+"""Separator between a model's field and its key in names of settings; no other name contains it."""
 
 VARIED = "variations."
-"""Prefix of a variation's settings; in no other name."""
+"""Prefix of a variation's settings; no other name contains it."""
 
 MOVES = ("motion", "clip", "fps")
-"""Fields of a model that say how it moves in sequences, and what an animated one plays of its file."""
+"""Fields of a model for its motion in sequences, and for the animation that it plays."""
 
 Settings = dict[str, str]
-"""Names of settings, and digests of what they are."""
+"""Names of settings, and digests of their values."""
 
 
 def check_fit(planned: Plan, there: PlanRecord) -> None:
-    """Raises RecipeError where the recipe's pictures, splits or models would not fit those that are there."""
+    """Raise RecipeError if the recipe's pictures, splits or models do not fit the existing ones."""
     settings_of_plan = settings(planned)
     for part in there.parts:
         _check_sampler(planned, part)
@@ -53,8 +53,8 @@ def check_fit(planned: Plan, there: PlanRecord) -> None:
 
 
 def settings(planned: Plan) -> Settings:
-    """Digests of what the frames of a data set have in common, by the names of the recipe's fields: of what is drawn, all that
-    may be.
+    """Digests of the settings that all frames of a data set share, by the names of the recipe's fields; random fields count
+    with their distributions.
     """
     recipe = planned.recipe
     value = recipe.model_dump(mode="json", include={"seed", "scene", "engine", "label_alpha", "viewpoints"})
@@ -97,7 +97,7 @@ def _movements(planned: Plan) -> Iterator[tuple[str, JsonValue]]:
 
 
 def _check_sampler(planned: Plan, part: Part) -> None:
-    """Scenes are added to scenes, and models x poses to models x poses."""
+    """Check that scenes are added to scenes, and models x poses to models x poses."""
     if part.is_sampled and part.sampler != planned.recipe.sampler:
         raise RecipeError(
             f"scenes: expected frames of sampler {part.sampler}, as the data set has; found {planned.recipe.sampler}: {FITTING}"
@@ -117,7 +117,7 @@ def _check_settings(planned: Plan, own: Settings, part: Part) -> None:
 
 
 def _check_movements(planned: Plan, own: Settings, part: Part) -> None:
-    """A model moves as it did: its sequences are known by its name and their viewpoints alone."""
+    """Check that models move as before: only a model's name and a viewpoint identify its sequences."""
     for spec, number in zip(planned.model_specs, planned.entries, strict=True):
         for field in MOVES:
             name = f"{field}{OF}{spec.key}"
@@ -135,7 +135,7 @@ def _value(recipe: object, name: str) -> str:
 
 
 def _check_splits(planned: Plan, part: Part) -> None:
-    """Splits stay what they are, but for the lists of models that are new."""
+    """Check that splits are unchanged, except for lists of new models."""
     if not part.is_sampled:
         return
     before, now = Splits.model_validate(part.recipe["splits"]), planned.recipe.splits
@@ -155,7 +155,7 @@ def _shares(splits: Splits) -> str:
 
 
 def _check_models(planned: Plan, there: PlanRecord) -> None:
-    """File systems that do not tell capitals apart would mix two models up."""
+    """Refuse models whose keys differ only in case, which some file systems would confuse."""
     known = {key.casefold(): key for key in there.models}
     for key, spec in planned.kept_keys:
         other = known.get(key.casefold(), key)

@@ -1,4 +1,4 @@
-"""The plan: which frames a recipe means, in which order, split and unit of work. Meshes are not touched."""
+"""The plan: the frames of a recipe, with their order, splits and units of work. No mesh is read."""
 
 from __future__ import annotations
 
@@ -74,7 +74,7 @@ from viewsphere.store.index import Index, Ranges, length, numbers, under, withou
 Made = TypeVar("Made")
 
 COUNTED = 200_000
-"""Frames, or scenes, whose splits are counted one by one."""
+"""Largest number of frames, or scenes, whose splits are counted one by one."""
 
 SHOT_FRAMES = 16
 """Most frames of a shot, unless the recipe or the caller says otherwise."""
@@ -95,12 +95,12 @@ class Plan(Shown, SamplingContext):
 
     @property
     def images(self) -> tuple[str, ...]:
-        """Absolute paths of the scene's picture files, by field; those of planes are the composition's."""
+        """Absolute paths of the scene's picture files, by field; the composition holds those of planes."""
         return tuple(file for files in self.pictures.values() for file in files)
 
     @property
     def poses(self) -> int:
-        """Number of poses; of all time steps together where something moves."""
+        """Number of poses; with movement, over all time steps."""
         return len(self.pose_list)
 
     @property
@@ -146,7 +146,7 @@ class Plan(Shown, SamplingContext):
 
     @cached_property
     def split_counts(self) -> dict[str, int]:
-        """Split -> number of its frames; of hashed ones what is expected, where there are more than `COUNTED` to hash."""
+        """Split -> number of its frames; for more than `COUNTED` hashed frames, the expected number."""
         by, drawn = self.recipe.splits.by, self.recipe.scenes is not None and self.recipe.splits.by == "model"
         counts = Counter({name: 0 for name in self.splits})
         if by in ("model", "scene", "sequence") and not (drawn and len(self.taken) > COUNTED):
@@ -204,22 +204,22 @@ class Plan(Shown, SamplingContext):
         return self.sampler.split(self, self.world(subject), pose)
 
     def keeping(self, splits: Mapping[str, str], poses: Sequence[int] = ()) -> Plan:
-        """The same plan for a data set that has some of its models, scenes and sequences in these splits already, and these
-        numbers for the plan's poses.
+        """The plan for a data set that has some of its models, scenes and sequences in these splits, and uses these numbers for
+        the plan's poses.
         """
         numbered = self if not isinstance(self.pose_list, SequencePoses) else self._numbering(self.pose_list.instants, poses)
         kept = {key: name for key, name in splits.items() if key in numbered.dealt_splits}
         return _composed(numbered.changed(kept_splits=kept)) if kept else numbered
 
     def changed(self, **fields: Any) -> Self:
-        """The same plan with other fields, of which its blocks do not follow: they are not counted out again."""
+        """The plan with other values of fields that do not affect its blocks, which are not computed again."""
         changed_plan = replace(self, **fields)
         if "blocks" in vars(self):
             vars(changed_plan)["blocks"] = self.blocks
         return changed_plan
 
     def _numbering(self, instants: int, poses: Sequence[int]) -> Plan:
-        """The same plan, whose sequences are numbered as those of a data set, where it has these numbers for their poses."""
+        """The plan with its sequences numbered as in a data set that has these numbers for their poses."""
         numbers = tuple(pose // instants for pose in poses[::instants])
         return self if numbers == tuple(range(len(numbers))) else _composed(self.changed(sequence_numbers=numbers))
 
@@ -244,7 +244,7 @@ class Plan(Shown, SamplingContext):
 
     @cached_property
     def _under(self) -> Mapping[str, Self]:
-        """The same plan under each variation; it shares what was computed, but for light and finish."""
+        """The plan under each variation; all share computed values, except light and finish."""
         return {name: self.with_variation(recipe, name) for name, recipe in self.recipe.conditions.items()}
 
     def with_variation(self, recipe: Recipe, variation: str) -> Self:
@@ -265,12 +265,12 @@ class Plan(Shown, SamplingContext):
         return len(self.rows)
 
     def shot(self, row: Row | int, box_of: BoxOf, redraws: Sequence[int] = (), redraw: int = 0) -> Shot:
-        """The shot of a row, or of its number, in the first draw of its scene from `redraw` on that has room for all; raises
-        IndexError past the end.
+        """The shot of a row, given as itself or by its number, in the first draw of its scene, from `redraw` on, with room for
+        all objects; raises IndexError past the end.
 
-        `redraws`: of each pose, how often what is random in it (its viewpoint, company of its own) is drawn again; none: never.
-        `box_of` gives the sizes of what stands on the floor and of what the cameras look at. Raises RecipeError where there is
-        no room for all that is to stand there, and what `box_of` raises.
+        `redraws`: the number of redraws of each pose's random values (its viewpoint, its own company); empty: no redraws.
+        `box_of` gives the boxes of things on the floor and of the cameras' targets. Raises RecipeError if there is not enough
+        room, and the errors of `box_of`.
         """
         row = self.rows[row] if isinstance(row, int) else row
         return self.take(row.subject, tuple(numbers(row.positions)), box_of, row.key, row.first, redraws, redraw)
@@ -285,22 +285,22 @@ class Plan(Shown, SamplingContext):
         redraws: Sequence[int] = (),
         redraw: int = 0,
     ) -> Shot:
-        """A shot of some poses (their numbers) of a subject, of one time step: of one pose where the recipe draws scenes for
-        each frame. `first` is the number of its first sample, `redraws` and `redraw` as for `shot`.
+        """A shot of some poses (their numbers) of a subject at one time step: a single pose if the recipe draws scenes for each
+        frame. `first` is the number of its first sample, `redraws` and `redraw` as for `shot`.
         """
         key = key or f"{subject}-{poses[0]:06d}"
         names = (self.world(subject), self.scene_pose(poses[0]) or "")
         return self._fitting(redraw, lambda number: self._taken_at(number, subject, poses, box_of, key, first, redraws), names)
 
     def standing(self, subject: str, box_of: BoxOf) -> Sequence[Standing]:
-        """The places of a subject's objects as far as they are known before rendering, in the first draw that has room."""
+        """The places of a subject's objects, as far as known before rendering, in the first draw with enough room."""
         return self._fitting(
             0, lambda number: tuple(self.sampler.standing(self.redrawn(number), subject, box_of)), (subject, "")
         )
 
     def _fitting(self, redraw: int, make: Callable[[int], Made], names: Names = ()) -> Made:
-        """The result of the first draw of a scene, from this number on, that fits; raises the first draw's RecipeError where
-        none does. `names`: of a scene that is asked for again, whose first fitting draw is kept.
+        """The result of the first fitting draw of a scene, from this number on; raises the first draw's RecipeError if none
+        fits. `names` identify a scene whose first fitting draw is cached for later calls.
         """
         problems: list[RecipeError] = []
         for number in range(max(redraw, self._fits.get(names, 0)), max(redraw + 1, self.draws)):
@@ -316,7 +316,7 @@ class Plan(Shown, SamplingContext):
 
     @cached_property
     def _fits(self) -> dict[Names, int]:
-        """The first fitting draw of each scene whose original does not fit, as far as it was looked for."""
+        """Cache: the first fitting draw of each scene whose original draw does not fit."""
         return {}
 
     @cached_property
@@ -325,7 +325,7 @@ class Plan(Shown, SamplingContext):
         return scene_draws(self.recipe)
 
     def whole(self, row: Row) -> Row | None:
-        """The poses of a row's scene, or sequence, as one row; None where the row has them, or nothing is redrawn for all."""
+        """All poses of a row's scene, or sequence, as one row; None if the row has all of them, or if no redraw affects all."""
         if self.draws == 1 or (self.recipe.time is None and self.recipe.scene.is_moved_each_frame):
             return None
         positions, each = self._positions[row.subject], len(self.rig.sensors)
@@ -362,7 +362,9 @@ class Plan(Shown, SamplingContext):
             return _emptied(shot, [number < self.recipe.empty for number in shares], box_of)
 
     def cast(self, subject: str, pose: int | None = None) -> tuple[ModelSpec, ...]:
-        """The recipe's models in a frame of a subject, from a pose (its number); without one, those in all of its frames."""
+        """The recipe's models in a frame of a subject, from a pose (its number); without a pose, the models in all of its
+        frames.
+        """
         return self.sampler.cast(self, self.world(subject), pose)
 
     def shots(self, box_of: BoxOf) -> Iterator[Shot]:
@@ -371,9 +373,9 @@ class Plan(Shown, SamplingContext):
 
     @cached_property
     def digest(self) -> str:
-        """SHA-256 of all that a store of this plan holds: the recipe, the models, the backgrounds and the chunks.
+        """SHA-256 of everything that determines a store of this plan: the recipe, the models, the backgrounds and the chunks.
 
-        Files count by their names, so that folders can move; what is in a model's file, the store itself watches.
+        Files are identified by their names, so that folders can move; the store itself checks the content of model files.
         """
         planes = () if self.composition is None else self.composition.images
         value = [
@@ -396,7 +398,7 @@ def _by_name(spec: ModelSpec) -> dict[str, Any]:
 
 
 def _unlit(scene: SceneEntry) -> Iterator[str]:
-    """Yield the reasons why a scene's pictures are black, or white."""
+    """Yield warnings about settings that make a scene's pictures black, or white."""
     dark = not all(isinstance(sky, NightSky) for sky in alternatives(scene.sky))
     if dark and any(is_night(sun) for sun in alternatives(scene.sun)):
         yield "scene.sun: at this date, time and place the sun is below the horizon: there is none, and no daylight"
@@ -464,14 +466,14 @@ def plan(recipe: Recipe | str | PathLike[str], shot_frames: int | None = None) -
 
 
 def _credits(planned: Plan) -> dict[str, Credit]:
-    """The credits that are known of the models that a plan keeps."""
+    """The known credits of the models that a plan keeps."""
     entries = zip(planned.model_specs, planned.entries, strict=True)
     credits = {spec.key: planned.recipe.models[number].credit for spec, number in entries}
     return credits_of(planned.kept_specs, {key: credit for key, credit in credits.items() if credit is not None})
 
 
 def _composed(planned: Plan) -> Plan:
-    """The plan with all that stands around its models: only those of one split are seen together, where splits are by model."""
+    """The plan with the surroundings of its models. With splits by model, a frame shows only models of one split."""
     recipe, specs = planned.recipe, planned.model_specs
     if not recipe.scene.is_composed:
         return planned
@@ -483,19 +485,19 @@ def _composed(planned: Plan) -> Plan:
 
 
 def check_engine(recipe: Recipe) -> None:
-    """See that the engine takes its options; raises UserError where it does not, or lacks its extra."""
+    """Check that the engine accepts its options; raises UserError if it does not, or if its extra is missing."""
     engine = plugins.load(EngineSpec, recipe.engine.name)
     with recipe.located():
         engine.check(engine_options(recipe))
 
 
 def check_sidecars(planned: Plan) -> None:
-    """See that what models' sidecars say can be read; raises ModelError, a line a mistake. No model is read."""
+    """Check that the models' sidecars are valid; raises ModelError, a line per error. No model is read."""
     each(said_of, planned.kept_specs)
 
 
 def check_images(planned: Plan) -> None:
-    """See that the pictures of the scene and its planes are pictures; raises RecipeError for the first that is not."""
+    """Check that the picture files of the scene and its planes are pictures; raises RecipeError for the first that is not."""
     with planned.recipe.located():
         check_pictures(planned.recipe, planned.pictures)
         for i, files in enumerate(() if planned.composition is None else planned.composition.images):
@@ -505,10 +507,10 @@ def check_images(planned: Plan) -> None:
 
 
 def _emptied(shot: Shot, empty: Sequence[bool], box_of: BoxOf) -> Shot:
-    """A shot of still pictures without its targets at the instants that are to be `empty`; scenery and ground stay.
+    """A shot of still pictures without its targets at the `empty` instants; scenery and ground remain.
 
-    All shots of a recipe come through here, those without an empty picture too: what is painted of a thing may not depend on
-    which pictures share its shot.
+    All shots of such a recipe use this function, also those without an empty picture: the rendering of a thing must not depend
+    on the other pictures of its shot.
     """
     things = tuple(_absent(thing, empty) if thing.is_target else thing for thing in shot.things)
     scene = shot.scene
@@ -519,21 +521,21 @@ def _emptied(shot: Shot, empty: Sequence[bool], box_of: BoxOf) -> Shot:
 
 
 def _lowest(shot: Shot, box_of: BoxOf) -> float:
-    """The lowest point of a model alone, in whose axes the world is; what is placed stands on z = 0."""
+    """The lowest point of a single model, whose axes are the world's; placed things stand on z = 0."""
     first = shot.things[0]
     return float(box_of(first.model, first.step)[:, 2].min()) + 0.0 if first.world_from_object == IDENTITY else 0.0
 
 
 def _absent(thing: Thing, empty: Sequence[bool]) -> Thing:
-    """The thing, which stands still, where it is there."""
+    """The still thing, absent at the `empty` instants."""
     at = thing.motion.poses[0]
     motion = Motion(poses=tuple(None if is_empty else at for is_empty in empty), steps=thing.motion.steps, moves=True)
     return thing.model_copy(update={"motion": motion})
 
 
 def off_center(context: SamplingContext, subject: str, shot: Shot) -> Shot:
-    """The shot with its cameras moved in their pictures' planes, as its recipe's jitter says: what they look at keeps its
-    distance along the camera's axis, and so its size. Cameras without a viewpoint of their own stay.
+    """The shot with its cameras moved in their picture planes by the recipe's jitter. Their targets keep the distance along the
+    camera's axis, and so their size. Cameras without their own viewpoint do not move.
     """
     if context.recipe.scene.jitter.off_center == JitterEntry().off_center:
         return shot

@@ -31,10 +31,10 @@ SKEWED = 1e-3
 
 
 def rig_of(recipe: Recipe, lens: Intrinsics) -> Rig | None:
-    """The rig that a recipe means, None where it has none; `lens` is its camera's.
+    """The rig of a recipe, None if it has none; `lens` is the lens of its camera.
 
-    Raises RecipeError for calibrations that cannot be read, sensors that keep channels which the recipe does not, matrices that
-    are no rotations, and for a recipe that asks for disparity of pictures that are not rectified.
+    Raises RecipeError for calibrations that cannot be read, sensors with channels that the recipe lacks, matrices that are not
+    rotations, and disparity of pictures that are not rectified.
     """
     match recipe.rig:
         case None:
@@ -57,7 +57,7 @@ def rig_of(recipe: Recipe, lens: Intrinsics) -> Rig | None:
 
 
 def _mounted(sensors: Mapping[str, tuple[Intrinsics, Float]]) -> Rig:
-    """Sensors by name, where they stand to one another: to the first after this."""
+    """A rig of named sensors, with poses relative to the first one."""
     (_, first), *_ = sensors.values()
     back = None if np.array_equal(first, np.eye(4)) else _inverse(first)
     poses = (pose if back is None else compose(back, pose) for _, pose in sensors.values())
@@ -159,7 +159,7 @@ def _pose(name: str, entry: SensorEntry) -> Float:
 
 
 def _facing(forward: Float) -> Float:
-    """Axes, in columns, of a sensor that looks along a direction, level in the rig."""
+    """The axes, in columns, of a level sensor of the rig that looks along a direction."""
     x, y, z = (forward / math.sqrt(float((forward * forward).sum()))).tolist()
     level = math.sqrt(x * x + z * z)
     right = np.array([z / level, 0.0, -x / level])
@@ -168,7 +168,7 @@ def _facing(forward: Float) -> Float:
 
 
 def _turned(x: float, y: float, z: float) -> Float:
-    """Turned to the right by y, then up by x, then clockwise by z, degrees: Ry Rx Rz, to twelve digits.
+    """The rotation to the right by y, then up by x, then clockwise by z, degrees: Ry Rx Rz, to twelve digits.
 
     The last digits of sines differ between processors.
     """
@@ -185,7 +185,7 @@ def _cosine_sine(degrees: float) -> tuple[float, float]:
 
 
 def _around(entry: SurroundRig) -> Iterator[tuple[str, Float]]:
-    """Names and poses, each sensor turned on to the right by an equal part of a turn, and `radius` ahead of the middle."""
+    """Names and poses of sensors that are evenly rotated to the right over a full turn, each `radius` ahead of the middle."""
     for i in range(entry.count):
         axes = _turned(0.0, 360.0 * i / entry.count, 0.0)
         yield f"camera{i}", rigid(axes, entry.radius * axes[:, 2])
@@ -198,7 +198,7 @@ def _calibrated(recipe: Recipe, entry: RigFile, lens: Intrinsics) -> Rig:
 
 
 def _sized(found: Calibrated, lens: Intrinsics) -> Intrinsics:
-    """The calibrated lens; at the recipe's size where the calibration says none."""
+    """The calibrated lens; with the recipe's size if the calibration has none."""
     width, height = found.size or (lens.width, lens.height)
     with told_of(f"rig: sensor {found.name}"):
         return Intrinsics(width=width, height=height, **found.lens, distortion=found.distortion)

@@ -11,26 +11,27 @@ from viewsphere.recipe.recipe import Splits
 
 
 def shared(splits: Splits) -> dict[str, float]:
-    """The splits that have a share of what is not listed, in the recipe's order."""
+    """The splits that have a share of the unlisted models or scenes, in the recipe's order."""
     return {name: part for name, part in splits.shares.items() if not isinstance(part, tuple) and part}
 
 
 def hashed(splits: Splits, seed: int, names: tuple[str, ...]) -> str:
-    """The split of what has these names: each split gets about its share of all names, and no name minds the others."""
+    """The split for these names: each split gets about its share of all names, and no name affects the others."""
     return drawn_split(shared(splits), seed, names)
 
 
 def drawn_split(shares: Mapping[str, float], seed: int, names: tuple[str, ...]) -> str:
-    """The same, of splits with these shares."""
+    """The split for these names, given the splits' shares."""
     edges = tuple(accumulate(shares.values()))
     return tuple(shares)[min(bisect_right(edges, share(seed, "split", *names)), len(shares) - 1)]
 
 
 def dealt(splits: Splits, seed: int, keys: Iterable[str], kept: Mapping[str, str]) -> dict[str, str]:
-    """The split of each model or scene: the one it has in `kept`, or where it is listed; the others are dealt out by quotas.
+    """The split of each model or scene: its split in `kept`, or the one that lists it; the others are assigned by quotas.
 
-    Quotas are each split's share of those others, rounded so that they add up, the largest remainders up; none is 0 where
-    there are as many of them as splits. They come in the order of their hashes, so that no list's order matters.
+    Quotas are each split's share of these others, rounded by largest remainders so that they add up. No quota is 0 if there are
+    at least as many others as splits. They are assigned in the order of their hashes, so that the order of lists does not
+    matter.
     """
     shares = shared(splits)
     listed = {key: name for name, some in splits.shares.items() if isinstance(some, tuple) for key in some}

@@ -17,10 +17,10 @@ from viewsphere.recipe.recipe import Recipe
 
 
 def tracks_of(recipe: Recipe, rig: Rig) -> Tracks | None:
-    """The points that every sequence's sensors follow, None where the recipe asks for none; what is drawn has no seed yet.
+    """The points that every sequence's sensors follow, None if the recipe has no tracks; random ones have no seed yet.
 
-    Raises RecipeError without a time, for instants that sequences do not have, for too many points, and for files that cannot
-    be read or name a position outside of a picture.
+    Raises RecipeError without a time, for instants beyond the sequences, for too many points, and for files that are unreadable
+    or have a position outside a picture.
     """
     entry = recipe.tracks
     if entry is None:
@@ -90,6 +90,6 @@ def _check_points(points: tuple[Query, ...], rig: Rig, count: int) -> None:
 
 
 def tracks_digest(tracks: Tracks | None) -> str:
-    """SHA-256 of listed points, which stand in a file; empty where there are none."""
+    """SHA-256 of points listed in a file; empty if there are none."""
     listed = tracks is not None and tracks.points
     return hashlib.sha256(repr(listed).encode()).hexdigest() if listed else ""

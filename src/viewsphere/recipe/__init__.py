@@ -1,1 +1,1 @@
-"""Recipes as users write them: their fields, distributions and files, and messages about mistakes."""
+"""Recipes as users write them: their fields, distributions and files, and error messages."""

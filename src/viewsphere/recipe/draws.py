@@ -1,8 +1,8 @@
-"""Distributions: what may stand for any number, vector, colour or word of a recipe's scene, and for some entries as a whole.
+"""Distributions, which may replace any number, vector, colour or word of a recipe's scene, and some whole entries.
 
 `Drawn[T]` is a field of type T that also takes a distribution over T. Each bound, mean and choice of a distribution is read
 like a T, with T's short forms, limits and error messages. Valid values of T form a convex set, so that anything drawn between
-valid values is valid. `drawn` replaces distributions by draws.
+valid values is valid. `drawn` replaces distributions with draws.
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ T = TypeVar("T")
 
 
 class Gaussian(OmitNone):
-    """A normal distribution. What lies beyond `min`, `max` or the field's own limits is never drawn."""
+    """A normal distribution. Values beyond `min`, `max` or the field's own limits are never drawn."""
 
     OMIT_IF_NONE = ("mean", "deviation", "min", "max")
 
@@ -109,7 +109,7 @@ class Distribution(OmitNone):
         return next(name for name in KINDS if getattr(self, name) is not None)
 
     def draw(self, rng_of: RngOf, path: Steps) -> Any:
-        """A concrete value; arguments that are distributions are drawn first, with paths of their own."""
+        """A concrete value; arguments that are distributions are drawn first, each with its own path."""
         rng = rng_of(path)
         if self.choice is not None:
             return drawn(self.choice[_pick(rng, len(self.choice), self.weights)], rng_of, (*path, "choice"))
@@ -130,7 +130,7 @@ def _pick(rng: Generator, count: int, weights: tuple[float, ...] | None) -> int:
 
 
 def _each(draw: Callable[..., float], *args: Any) -> Any:
-    """Draw once for numbers, and for vectors once a component; a number beside vectors counts for each component."""
+    """One draw for numbers, and one for each component of vectors; a number used with vectors applies to each component."""
     size = next((len(arg) for arg in args if isinstance(arg, tuple)), None)
     if size is None:
         return draw(*args)
@@ -283,7 +283,7 @@ def span(value: Any) -> tuple[float, float]:
 
 
 def component(value: Any, index: int) -> Any:
-    """One number of a vector that may be drawn, as a number that may be drawn; a number stands for each component."""
+    """One component of a vector or distribution, as a number or distribution; a single number applies to each component."""
     if isinstance(value, tuple):
         return cast(tuple[Any, ...], value)[index]
     if not isinstance(value, Distribution):
@@ -333,7 +333,7 @@ def _of(schema: Any) -> tuple[Of, tuple[float, float]]:
 
 
 Drawn = Annotated[T, OrDrawn()]
-"""A field of a recipe that is a T or a distribution over T. A draw, as scenes are made of, is a T."""
+"""A field of a recipe that is a T or a distribution over T. A draw, as used in scenes, is a T."""
 
 _DEVIATION: TypeAdapter[Any] = TypeAdapter(
     Drawn[Annotated[float, Field(strict=True, ge=0, allow_inf_nan=False)]], config=ConfigDict(defer_build=True)
@@ -341,7 +341,7 @@ _DEVIATION: TypeAdapter[Any] = TypeAdapter(
 
 
 def drawn(value: T, rng_of: RngOf, path: Steps = ()) -> T:
-    """The value with a draw in the place of every distribution in it."""
+    """The value with every distribution in it replaced by a draw."""
     if isinstance(value, Distribution):
         return value.draw(rng_of, path)
     if isinstance(value, tuple):
@@ -370,7 +370,7 @@ def alternatives(value: Any) -> Iterator[Any]:
 
 
 def ranged(value: Any) -> Any:
-    """[low, high] as what it is short for."""
+    """[low, high] as the uniform distribution that it abbreviates."""
     return {"uniform": value} if isinstance(value, (list, tuple)) else value
 
 
@@ -379,7 +379,7 @@ CountDrawn = Annotated[
     BeforeValidator(ranged),
     OrShort({"type": "array", "items": {"type": "integer", "minimum": 1}, "minItems": 2, "maxItems": 2}),
 ]
-"""A whole number above 0; [low, high] is short for a uniform one."""
+"""A whole number above 0; [low, high] means a uniform distribution."""
 
 CountOrNone = Annotated[
     Drawn[Natural],

@@ -30,13 +30,13 @@ class Entry(Frozen):
 
 
 def entry_of(part: type[Part], *, without: Names = (), fixed: Names = (), optional: Names = ()) -> type[Part]:
-    """A base for the entry of `part`: a class upon it gets every field of the part that its own body and bases lack.
+    """A base for the entry of `part`: a subclass gets every field of the part that its own body and bases lack.
 
     without: fields that recipes do not have.
-    fixed: fields that are not drawn, because planning has to know them.
+    fixed: fields that are not drawn, because planning needs them.
     optional: fields that are None unless given, because the entry has other ways to express them; they precede its own fields.
 
-    To a type checker an entry is the class of the part that is drawn from it, as with `Drawn`.
+    For a type checker, an entry has the class of the part that is drawn from it, as with `Drawn`.
     """
 
     class Derived(Entry):
@@ -50,7 +50,7 @@ def entry_of(part: type[Part], *, without: Names = (), fixed: Names = (), option
 
 
 def concrete(entry: Frozen, **others: Any) -> Any:
-    """The part of a scene that a drawn entry means; `others` are fields that follow from more than the entry.
+    """The part of a scene for a drawn entry; `others` are fields that do not follow from the entry alone.
 
     Fields that are None get the defaults of the scene's class.
     """
@@ -70,7 +70,7 @@ def words_of(part: type[Frozen], name: str) -> list[str]:
 
 
 def is_drawn_color(value: Any) -> bool:
-    """True if a value is a colour with distributions: one over whole colours, or a list with one for a component."""
+    """True if a value is a colour with distributions: a distribution over colours, or a list with one for a component."""
     if isinstance(value, Mapping):
         return not value.keys().isdisjoint(KINDS)
     parts = cast(tuple[Any, ...], value) if isinstance(value, (list, tuple)) else ()

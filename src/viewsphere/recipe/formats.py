@@ -32,7 +32,7 @@ class FormatEntry(Frozen):
         return {self.name: self.options} if self.options else self.name
 
     def over(self, options: Mapping[str, JsonValue]) -> FormatEntry:
-        """This entry with these options where it has no others."""
+        """This entry with these options as defaults for its own."""
         return FormatEntry(name=self.name, options={**options, **self.options})
 
     def whole(self, field: str | None = None) -> FormatEntry:
@@ -43,8 +43,8 @@ class FormatEntry(Frozen):
     def arguments(self, field: str | None = None) -> tuple[Frozen, ...]:
         """Return the last arguments of the format's functions: its `Options`, or nothing if it has none.
 
-        Raises RecipeError for options that it does not have, as mistakes of `field` (default: the format's name), and UserError
-        for an unknown format.
+        Raises RecipeError for unknown options, as errors of `field` (default: the format's name), and UserError for an unknown
+        format.
         """
         return plugins.load(FormatSpec, self.name).read_options(self.name, self.options, field or self.name)
 
@@ -71,11 +71,11 @@ FormatField = Annotated[FormatEntry, BeforeValidator(_entry), WithJsonSchema(FOR
 _FIELDS = TypeAdapter(tuple[FormatField, ...])
 
 Formats = str | Sequence[str | Mapping[str, Mapping[str, Any]] | FormatEntry]
-"""Formats as they are asked for: names in a text with commas, or a list of names and of mappings of a name to its options."""
+"""Requested formats: names in a text with commas, or a list of names and of mappings from a name to its options."""
 
 
 def read_formats(formats: Formats) -> tuple[FormatEntry, ...]:
-    """The formats as entries, each name once; raises RecipeError for what is no format's name and options."""
+    """The formats as entries, each name once; raises RecipeError for invalid formats."""
     names = formats.split(",") if isinstance(formats, str) else formats
     listed = [name.strip() if isinstance(name, str) else name for name in names if name]
     try:

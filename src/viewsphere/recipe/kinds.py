@@ -16,7 +16,7 @@ from viewsphere.validation.errors import error_at, one_of, shown
 
 
 def _by_reference(options: type[Frozen]) -> CoreSchema:
-    """A core schema whose JSON schema is a reference to that of a class."""
+    """A core schema whose JSON schema is a reference to the schema of a class."""
     return core_schema.no_info_plain_validator_function(
         options.model_validate,
         ref=f"{options.__module__}.{options.__qualname__}:{id(options)}",
@@ -25,8 +25,8 @@ def _by_reference(options: type[Frozen]) -> CoreSchema:
 
 
 class ByKind:
-    """Reads a mapping as the class of its `kind`, which is `default` where the mapping has none. Plug-ins are loaded only where
-    a recipe names them; the schema lists those that come with viewsphere.
+    """Reads a mapping as the class of its `kind`, by default `default`. Plug-ins are loaded only if a recipe names them; the
+    schema lists the plug-ins of viewsphere itself.
     """
 
     def __init__(self, spec: type[Spec], default: str, own: Mapping[str, type[Frozen]] | None = None) -> None:

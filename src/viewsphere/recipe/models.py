@@ -1,4 +1,4 @@
-"""The models of a recipe: which files or models of sources, and how each is turned, sized and named."""
+"""The models of a recipe: files or models of sources, with their orientation, size and names."""
 
 from __future__ import annotations
 

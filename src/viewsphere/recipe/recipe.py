@@ -1,4 +1,4 @@
-"""The recipe: what the user wrote, validated and frozen. It holds ranges and distributions, not draws."""
+"""The recipe: the user's settings, validated and frozen. It holds ranges and distributions, not draws."""
 
 from __future__ import annotations
 
@@ -58,8 +58,8 @@ def _shares(value: tuple[float, float]) -> tuple[float, float]:
 
 
 class WantedEntry(Frozen):
-    """Shares [low, high] in which the labels of these names of a frame's model shall lie; of random scenes those of the model
-    of which least is seen, and of the one of which most is cut off.
+    """Ranges [low, high] for the labels with these names of a frame's model; in random scenes, for the least visible model, and
+    for the most truncated one.
     """
 
     visibility: Shares | None = Field(default=None, description="visible share: [0.3, 0.6]")
@@ -81,7 +81,7 @@ Shares = Annotated[Interval, AfterValidator(_shares)]
 
 
 BEFORE_RENDERING = {"name", "formats", "max_frames", "shot_frames", "keep_annotations_above"}
-"""Fields of a recipe that change neither a picture nor a label, as the credits of its models do not."""
+"""Fields of a recipe that change neither pictures nor labels, such as the credits of its models."""
 
 Share = Annotated[
     Annotated[Number, Field(ge=0, le=1), Tag("number")] | Annotated[tuple[str, ...], Tag("list")],
@@ -152,10 +152,11 @@ def _distinct_formats(entries: tuple[FormatEntry, ...]) -> tuple[FormatEntry, ..
 
 
 class Recipe(Shown, Frozen):
-    """A data set to be made. From a file by `Recipe.load`, or from keyword arguments that are what the file would say.
+    """The description of a data set to be made: from a file by `Recipe.load`, or from keyword arguments equal to the file's
+    fields.
 
-    Any mistake raises RecipeError. Relative paths are relative to the recipe's file, or to the folder that was the
-    working folder when a recipe was made in Python.
+    Errors raise RecipeError. Relative paths are relative to the recipe's file or, for a recipe made in Python, to the working
+    folder at that time.
     """
 
     name: str = Field(default="dataset", min_length=1, max_length=200, description="name of the data set")
@@ -266,7 +267,7 @@ class Recipe(Shown, Frozen):
     @field_validator("channels")
     @classmethod
     def _as_meant(cls, value: tuple[str, ...], info: ValidationInfo) -> tuple[str, ...]:
-        """With what other fields ask for: tracks, points of LiDARs, and pictures with alpha."""
+        """The channels, with those that other fields require: tracks, points of LiDARs, and pictures with alpha."""
         scene: SceneEntry | None = info.data.get("scene")
         if info.data.get("tracks") is not None:
             value = tuple(dict.fromkeys((*value, "tracks")))
@@ -308,7 +309,7 @@ class Recipe(Shown, Frozen):
         return value
 
     def model_post_init(self, context: Any, /) -> None:
-        """Remember the folder that relative paths start from, and the file's lines."""
+        """Store the folder of relative paths, and the file's lines."""
         self._folder = Path((context or {}).get("folder", Path.cwd())).absolute()
         self._marks = (context or {}).get("marks") or Marks()
 
@@ -333,8 +334,8 @@ class Recipe(Shown, Frozen):
     def load(cls, path: str | PathLike[str], changes: Mapping[str, Any] | None = None) -> Self:
         """Read a recipe file and those it extends; `changes` are fields to set: `{"viewpoints.elevation": [10, 20]}`.
 
-        A recipe at a URL (`s3://bucket/cars/recipe.yaml`) is copied here with all that lies in its folder. Raises RecipeError
-        with file, line and field of every mistake, RemoteError where a URL does not answer.
+        A recipe at a URL (`s3://bucket/cars/recipe.yaml`) is copied here with its folder. Raises RecipeError with file, line
+        and field of every error, RemoteError if a URL does not answer.
         """
         from viewsphere.recipe.reading.extends import assemble
         from viewsphere.recipe.reading.fetched import fetched
@@ -345,7 +346,7 @@ class Recipe(Shown, Frozen):
 
     @classmethod
     def of(cls, recipe: Recipe | str | PathLike[str]) -> Recipe:
-        """The recipe itself, or that of a file; raises RecipeError as `load` does, and for anything else."""
+        """The recipe itself, or the recipe in a file; raises RecipeError as `load` does, and for anything else."""
         if isinstance(recipe, Recipe):
             return recipe
         if not isinstance(recipe, (str, PathLike)):
@@ -353,15 +354,15 @@ class Recipe(Shown, Frozen):
         return cls.load(recipe)
 
     def redrawn(self, seed: int) -> Self:
-        """The recipe whose random choices follow from another seed: all but its models and its splits."""
+        """The recipe with another seed for all random choices, except its models and its splits."""
         again = self.model_copy(update={"seed": seed})
         again._lasting_seed = self.lasting_seed
         return again
 
     @property
     def conditions(self) -> Mapping[str, Recipe]:
-        """The recipe under each of its variations, by their names, without variations; itself alone, without a name, where it
-        has none.
+        """The recipes under each variation, by the variations' names, themselves without variations. A recipe without
+        variations returns only itself, with an empty name.
         """
         if self.variations is None:
             return {"": self}
@@ -393,7 +394,7 @@ class Recipe(Shown, Frozen):
 
     @property
     def digest(self) -> str:
-        """SHA-256 (hexadecimal) of all that changes a picture or a label; formats, for one, do not."""
+        """SHA-256 (hexadecimal) of all fields that change a picture or a label; formats, for example, do not count."""
         credit: Any = {"models": {"__all__": set(Credit.model_fields)}}
         value = self.model_dump(mode="json", exclude=dict.fromkeys(BEFORE_RENDERING, True) | credit)
         text = json.dumps(value, separators=(",", ":"))

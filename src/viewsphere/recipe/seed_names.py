@@ -18,10 +18,10 @@ _UNCHANGED = """
     strength sun target temperature_k texture tile time tint toward transform turbidity turn velocity view vignetting
     visibility walkers wet wind windows zenith zoom
 """
-"""Fields that are still called what seeds them."""
+"""Fields whose names equal their seed names."""
 
 _RENAMED = {"azimuth": "azimuth_deg", "elevation": "elevation_deg", "tilt": "tilt_deg"}
-"""Fields with another name than the name that seeds them."""
+"""Fields whose names differ from their seed names."""
 
 SEED_NAMES = {**{name: name for name in _UNCHANGED.split()}, **_RENAMED}
 

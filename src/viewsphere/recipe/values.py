@@ -1,4 +1,4 @@
-"""The kinds of value a recipe's fields take: numbers, ranges, colours, and the short forms they may be written in."""
+"""The kinds of value of a recipe's fields: numbers, ranges, colours, and their short forms."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ def _ordered(value: tuple[float, float]) -> tuple[float, float]:
 
 
 def shape_of(value: object) -> str:
-    """The shape of a value, `mapping`, `list`, `text` or `number`, by which a union finds the member that it can only mean."""
+    """The shape of a value, `mapping`, `list`, `text` or `number`, by which a union selects its only possible member."""
     if isinstance(value, (Mapping, Frozen)):
         return "mapping"
     if isinstance(value, (list, tuple)):
@@ -83,7 +83,7 @@ class Range(Frozen):
         return math.floor((self.stop - self.start) / self.step + 1e-9) + 1
 
     def value(self, index: int) -> float:
-        """start + index * step in decimals, as they were written: 0.3, not 0.30000000000000004; -0.3 + 3 * 0.1 is 0."""
+        """start + index * step in decimal arithmetic: 0.3, not 0.30000000000000004; -0.3 + 3 * 0.1 is 0."""
         return float(Decimal(repr(self.start)) + index * Decimal(repr(self.step)))
 
 
@@ -109,7 +109,7 @@ Interval = Annotated[
 def parse_color(value: object, also: str = "", words: Sequence[str] = ()) -> tuple[float, float, float]:
     """An sRGB colour, three numbers of 0..1, from its name, `#rgb`, `#rrggbb` or [r, g, b].
 
-    Raises ValueError, which says what else (`also`) is allowed, and names the nearest of the colours and `words`.
+    Raises ValueError, which lists other allowed values (`also`), and suggests the nearest of the colours and `words`.
     """
     expected = f"expected {also}a colour name, '#rrggbb' or [r, g, b] of 0..1"
     if isinstance(value, str):

@@ -1,4 +1,4 @@
-"""Conditions: what changes of a recipe's light, weather and finish, so that the same shots are rendered under each."""
+"""Conditions: changes of a recipe's light, weather and finish; the same shots are rendered under each."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ CONDITIONS = ("sun", "sky", "lights", "fog", "rain", "snow", "wet", "lamps", "ba
 """Fields of a scene that no label depends on."""
 
 PAIRED = "paired"
-"""The key, among the names of variations, that says whether they have the same draws."""
+"""The key, next to the names of variations, for equal draws in all of them."""
 
 Name = Annotated[str, StringConstraints(pattern=r"^[A-Za-z][A-Za-z0-9_]*$", max_length=64)]
 
@@ -57,7 +57,7 @@ Change = Annotated[SceneEntry, AfterValidator(_of_light_alone), PlainSerializer(
 
 
 def _with_paired(schema: dict[str, Any]) -> None:
-    """Let the JSON schema of variations have the key `paired`, which is no variation."""
+    """Add the key `paired`, which is not a variation, to the JSON schema of variations."""
     changes = dict(schema.pop("patternProperties"))
     schema["patternProperties"] = {pattern.replace("^", f"^(?!{PAIRED}$)", 1): change for pattern, change in changes.items()}
     description = "whether equal distributions of several variations have equal draws"
@@ -68,19 +68,19 @@ _Changes = Annotated[dict[Name, Change], Field(min_length=1, json_schema_extra=_
 
 
 class Variations(dict[str, SceneEntry]):
-    """Changes of a scene by their names. Each draws the fields that it sets on its own; where they are `paired`, equal
-    distributions of several have equal draws.
+    """Named changes of a scene. Each variation draws its own fields separately; if they are `paired`, equal distributions in
+    several variations have equal draws.
     """
 
     paired: bool = False
 
     def drawn_alone(self, name: str) -> frozenset[str]:
-        """The fields of the scene that a variation draws on its own."""
+        """The fields of the scene that a variation draws separately."""
         return frozenset() if self.paired else frozenset(self[name].model_fields_set)
 
     @classmethod
     def __get_pydantic_core_schema__(cls, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
-        """That of a mapping, which may have the key `paired`, too."""
+        """The core schema of a mapping that may also have the key `paired`."""
         changes = handler(_Changes)
         written = core_schema.wrap_serializer_function_ser_schema(_written, schema=changes)
         return core_schema.no_info_wrap_validator_function(_read, changes, serialization=written)
@@ -104,13 +104,13 @@ def _written(value: Variations, handler: SerializerFunctionWrapHandler) -> dict[
 
 
 def varied(scene: SceneEntry, change: SceneEntry) -> SceneEntry:
-    """A scene whose fields are those of a variation where it has them. Raises ValueError where they do not fit the others."""
+    """A scene with the fields of a variation in place of its own. Raises ValueError if they do not fit the other fields."""
     fields: dict[str, Any] = {name: getattr(scene, name) for name in scene.model_fields_set}
     return SceneEntry.model_validate(fields | {name: getattr(change, name) for name in change.model_fields_set})
 
 
 def check_alike(scenes: dict[str, SceneEntry]) -> None:
-    """Raise ValueError where a label would depend on which of these scenes, by their names, is rendered."""
+    """Raise ValueError if labels would differ between these scenes, given by their names."""
     first, *others = scenes
     for name in others:
         one, other = scenes[first], scenes[name]

@@ -1,14 +1,14 @@
-"""The store: finished shots, each written aside and put in its place when whole, and the data set they make up. It lies on a
-disk or at a URL (`places`).
+"""The store: finished shots, each written to a scratch folder and moved into place when complete, and the data set that they
+form. It is on a disk or at a URL (`places`).
 
-    OUT/store/plan.json                        the plan: what a recipe asked for
+    OUT/store/plan.json                        the plan made from the recipe
     OUT/store/models/<key>/                    the normalised model (OBJ, GLB) and model.json
     OUT/store/shots/<hh>/<shot>/frames.json    records of the shot's frames
-    OUT/store/shots/<hh>/<shot>/shot.json      the scene that they show (scenery.json: its things that are no objects)
+    OUT/store/shots/<hh>/<shot>/shot.json      the scene that they show (scenery.json: its things that are not objects)
     OUT/store/shots/<hh>/<shot>/<channel>/<sample>.png|.tiff|...
-    OUT/store/writing/                         folders that are not whole yet; heartbeats of runs at work
-    OUT/store/failed/<k>-of-<n>.json           what the last run of a shard told, if it failed
-    OUT/store/lock                             held for moments by who changes what runs have in common
+    OUT/store/writing/                         incomplete folders; heartbeats of active runs
+    OUT/store/failed/<k>-of-<n>.json           the last report of a shard's run, if it failed
+    OUT/store/lock                             held briefly by a run that changes shared files
 
 `hh` are the first two hexadecimal digits of the shot key's SHA-256, so that no folder grows large. Workers never share
 a file.

@@ -1,4 +1,4 @@
-"""CREDITS.md at a data set's root: the licences of its models, and whom to name."""
+"""CREDITS.md at a data set's root: the licences and the attributions of its models."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ Whose the 3D models of this data set are, and on which terms they may be used.
 
 
 def credited(models: Iterable[ModelInfo]) -> dict[Credit | None, tuple[str, ...]]:
-    """Keys of the models of each credit, None for those of which none is known; time steps count as their model."""
+    """Keys of the models with each credit; models without a credit are under None. Time steps count as their model."""
     keys: defaultdict[Credit | None, dict[str, None]] = defaultdict(dict)
     for info in models:
         keys[info.credit][info.track or info.key] = None
@@ -38,7 +38,7 @@ def credited(models: Iterable[ModelInfo]) -> dict[Credit | None, tuple[str, ...]
 
 
 def credits_text(models: Iterable[ModelInfo]) -> str:
-    """The file's text, GitHub Flavored Markdown (https://github.github.com/gfm/); empty where no credit is known."""
+    """The file's text, GitHub Flavored Markdown (https://github.github.com/gfm/); empty if no credit is known."""
     groups = credited(models)
     rows = (_row(credit or Credit(), keys) for credit, keys in groups.items())
     return HEAD + "".join(rows) if any(groups) else ""
@@ -51,7 +51,7 @@ def _row(credit: Credit, keys: Iterable[str]) -> str:
 
 
 def escaped(text: str) -> str:
-    """The text as Markdown that shows it as it is, in a table too: no markup, HTML, formula or end of a cell."""
+    """The text, escaped so that Markdown shows it unchanged, also in tables: no markup, HTML, formulas or cell ends."""
     printable = "".join(c if c.isprintable() else " " for c in text)
     return re.sub(r"([\\`*_\[\]<>|~&!$@:])", r"\\\1", printable)
 
@@ -63,7 +63,7 @@ def credits_digest(models: Iterable[ModelInfo]) -> str | None:
 
 
 def write_credits(dataset: Dataset) -> None:
-    """Write the file, where a credit is known; raises StoreError where that fails."""
+    """Write the file if a credit is known; raises StoreError if writing fails."""
     if text := credits_text(dataset.models):
         dataset.store.write_beside(CREDITS, text)
 

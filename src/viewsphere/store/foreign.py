@@ -1,4 +1,4 @@
-"""Data sets made elsewhere, on their way into a store."""
+"""Data sets from other tools, during their import into a store."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class Loaded:
 
 @dataclass(frozen=True)
 class ForeignFrame:
-    """A frame whose channels lie in files of another data set, or are given as the content of such a file."""
+    """A frame whose channels are files of another data set, or the bytes of such files."""
 
     sample: Sample
     files: Mapping[str, Path | Loaded]
@@ -38,8 +38,8 @@ class ForeignFrame:
 
 @dataclass(frozen=True)
 class ForeignModel:
-    """A model whose files, of the names that `info` gives its OBJ and GLB, are among these of another data set, or are what
-    `write` puts into a folder.
+    """A model whose OBJ and GLB have the names in `info`. Its files come from another data set, or `write` puts them into a
+    folder.
     """
 
     info: ModelInfo
@@ -52,8 +52,8 @@ class ForeignDataset:
     """The result of a format's `read`: facts about the whole data set, and its frames one by one, in order.
 
     Frames are numbered from 0, and `frames` can be called again. `left_out` names the broken entries that were left out.
-    `said`: what the data set says of itself, as COCO has it (`info` of each split, `licenses`, and of categories, by their
-    names, the other keys, such as `keypoints`); JSON that is kept in the plan.
+    `said`: the data set's own metadata, as in COCO: `info` of each split, `licenses`, and the other keys of categories, such as
+    `keypoints`, by the categories' names. It is JSON that the plan stores.
     """
 
     name: str
@@ -87,10 +87,10 @@ def foreign_object(
     /,
     **known: Any,
 ) -> ObjectAnnotation:
-    """An object of which only its mask, the run-length code `counts`, or only its `box`, is known, and the fields in `known`;
-    all others are NaN.
+    """An object with only a mask (the run-length code `counts`) or only a `box`, and the fields in `known`; all other fields
+    are NaN.
 
-    `size` is the image's (width, height), `source` the annotation as it stood in the other data set.
+    `size` is the image's (width, height), `source` the annotation in the other data set.
     """
     width, height = size
     tight = counts and rle_box(height, width, counts)

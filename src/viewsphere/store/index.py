@@ -1,6 +1,6 @@
-"""The index of all shots: which samples each of them holds. Keys are made and read here, and nowhere else.
+"""The index of all shots, with the samples of each. Only this module makes and parses keys.
 
-Nothing here grows with the number of samples: rows are counted out when somebody asks for them.
+Memory does not grow with the number of samples: rows are computed on request.
 """
 
 from __future__ import annotations
@@ -16,27 +16,29 @@ from typing import overload
 from viewsphere.model.shard import ALL, Shard
 
 MOST_DIGITS = 100
-"""More than a position's number has: a stranger's key may end with more than Python reads."""
+"""More digits than a position has: a foreign key may end with more digits than Python parses."""
 
 Ranges = tuple[tuple[int, int], ...]
 """Numbers, as ranges [first, stop) in order."""
 
 
 def under(subject: str, variation: str) -> str:
-    """The name of a subject under a variation, which no other has: that of a variation has no hyphen; without one its own."""
+    """The unique name of a subject under a variation (variation names have no hyphen); without a variation, the subject's own
+    name.
+    """
     return f"{subject}-{variation}" if variation else subject
 
 
 def without(subject: str) -> tuple[str, str]:
-    """The subject and the variation that make a name."""
+    """The subject and the variation in a name."""
     name, _, variation = subject.rpartition("-")
     return name, variation
 
 
 @dataclass(frozen=True, slots=True)
 class Row:
-    """One shot: its key (stable, unique, fit for a folder's name), what it shows, its first sample and number of samples, the
-    number of the part that renders it, and at which positions its subject is taken: numbers of poses, or of scenes.
+    """One shot: its key (stable, unique, valid as a folder's name), its subject, its first sample and number of samples, the
+    number of the part that renders it, and the positions of its subject: numbers of poses, or of scenes.
     """
 
     key: str
@@ -49,7 +51,7 @@ class Row:
 
 @dataclass(frozen=True)
 class Block:
-    """Subjects that were taken alike: every one, in order, at every position of the ranges, with `each` samples there."""
+    """Subjects with equal positions: each subject, in order, at every position of the ranges, with `each` samples there."""
 
     subjects: tuple[str, ...]
     positions: Ranges
@@ -68,10 +70,11 @@ class Block:
 
 @dataclass(frozen=True, eq=False)
 class Index(Sequence[Row]):
-    """The shots of some blocks, in order, of `most` positions at most: those of one subject differ by one position at most.
+    """The shots of some blocks, in order, each with at most `most` positions: shots of one subject differ by one position at
+    most.
 
-    `first` is the number of the first sample, `part` that of the part that renders them; `suffix` ends all keys. An index may
-    have but a `shard` of these shots, which are as they are in the whole one.
+    `first` is the number of the first sample, `part` the number of the part that renders the shots; `suffix` ends all keys. An
+    index may have only a `shard` of these shots, which are equal to those of the whole index.
     """
 
     blocks: tuple[Block, ...]
@@ -104,7 +107,7 @@ class Index(Sequence[Row]):
         return self.without(())
 
     def without(self, subjects: Container[str]) -> Iterator[Row]:
-        """The rows of all other subjects, in order; however many those of these are, they take no time."""
+        """The rows of all other subjects, in order. Time does not depend on the number of omitted rows."""
         for number, block in enumerate(self.blocks):
             for place, subject in enumerate(block.subjects):
                 if subject not in subjects:
@@ -156,7 +159,7 @@ class Index(Sequence[Row]):
         return tuple(self._places)
 
     def row_at(self, sample: int) -> Row:
-        """The row that holds a sample; raises IndexError for one that none holds."""
+        """The row that holds a sample; raises IndexError if no row holds it."""
         if not self.first <= sample < self._samples[-1]:
             raise IndexError(f"expected a sample of {self.first}..{self._samples[-1] - 1}, got {sample}")
         number, subject, chunk = self._place_of(sample)
@@ -169,19 +172,19 @@ class Index(Sequence[Row]):
         return next(self.rows_with_keys((key,)), None)
 
     def rows_with_keys(self, keys: Iterable[str]) -> Iterator[Row]:
-        """The rows of these keys, but for those that it does not have."""
+        """The rows of these keys; unknown keys are left out."""
         return (self._row(*spot) for _, spot in self._spots(keys))
 
     def held(self, keys: Iterable[str]) -> Iterator[tuple[str, str, int]]:
-        """Key, subject and number of samples of the same rows, which takes a fraction of their time."""
+        """Key, subject and number of samples of the rows of `rows_with_keys`, in a fraction of the time."""
         for key, (number, subject, chunk) in self._spots(keys):
             block = self.blocks[number]
             yield key, block.subjects[subject], (self._edge(number, chunk + 1) - self._edge(number, chunk)) * block.each
 
     def _spots(self, keys: Iterable[str]) -> Iterator[tuple[str, tuple[int, int, int]]]:
-        """The keys that it has: the block of each, its subject's place there, and which of the subject's chunks it is.
+        """The known keys, each with its block, its subject's place in the block, and its chunk of the subject.
 
-        What ends the key of one subject is found once for all.
+        The chunk for each key ending is computed only once.
         """
         ends: dict[tuple[int, str], int | None] = {}
         for key in keys:
@@ -194,7 +197,7 @@ class Index(Sequence[Row]):
                     yield key, (number, place, chunk)
 
     def _chunk_of(self, number: int, end: str) -> int | None:
-        """The chunk of a block's subjects whose key ends so, None if there is none."""
+        """The chunk of a block's subjects whose key has this end, None if there is none."""
         digits = end.removesuffix(self.suffix)
         if not digits.isdecimal() or len(digits) >= MOST_DIGITS or end != self._end(int(digits)):
             return None
@@ -205,7 +208,7 @@ class Index(Sequence[Row]):
         return chunk if self._edge(number, chunk) == offset else None
 
     def _end(self, position: int) -> str:
-        """Return the end of a shot's key, behind its subject and a hyphen, by its first position."""
+        """Return the end of a shot's key, after its subject and a hyphen, from its first position."""
         return f"{position:06d}{self.suffix}"
 
     def _row(self, number: int, subject: int, chunk: int) -> Row:
@@ -218,7 +221,7 @@ class Index(Sequence[Row]):
         return Row(key, name, first, (end - begin) * block.each, self.part, positions)
 
     def _place_of(self, sample: int) -> tuple[int, int, int]:
-        """The block that holds a sample, its subject's place there, and which of the subject's chunks it is in."""
+        """The block that holds a sample, its subject's place in the block, and its chunk of the subject."""
         number = bisect_right(self._samples, sample) - 1
         block = self.blocks[number]
         subject, position = divmod((sample - self._samples[number]) // block.each, block.size)
@@ -271,7 +274,7 @@ class Index(Sequence[Row]):
 
     @cached_property
     def _places(self) -> dict[str, list[tuple[int, int]]]:
-        """Of each subject: the blocks that it is in, and its place there."""
+        """For each subject, its blocks and its place in each."""
         places: defaultdict[str, list[tuple[int, int]]] = defaultdict(list)
         for number, block in enumerate(self.blocks):
             for place, subject in enumerate(block.subjects):

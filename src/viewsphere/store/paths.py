@@ -1,6 +1,6 @@
-"""Paths and names that a data set holds, which a stranger may have written: they mean its own files, and nothing else.
+"""Checks of paths and names in a data set, which may be untrusted: they may refer only to its own files.
 
-Whoever turns a stored path into a file does it here.
+All conversions of stored paths to files use this module.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from viewsphere.urls.inside import PLAIN, is_inside
 
 
 def file_inside(root: Path, relative: str) -> Path:
-    """The file of this stored path below the data set's folder `root`; it need not be there.
+    """The file of this stored path below the data set's folder `root`; it may be absent.
 
     Raises StoreError for a path that is absolute or holds `..`, and for one that leaves the folder by a link.
     """
@@ -42,9 +42,7 @@ def file_inside(root: Path, relative: str) -> Path:
 
 
 def _is_straight(root: Path, relative: str) -> bool:
-    """Return whether nothing on the way from a folder to what lies below it is a link; False, too, where that is not plain to
-    see.
-    """
+    """Return whether no link is on the path from a folder to a file below it; False also if that cannot be determined."""
     if os.name == "nt" or not PLAIN.fullmatch(relative):
         return False
     place = str(root)
@@ -61,7 +59,7 @@ def _is_straight(root: Path, relative: str) -> bool:
 
 
 def files_inside(root: Path, folder: Path) -> Sequence[Path]:
-    """The files that lie in a folder of the data set, sorted; raises StoreError as `file_inside` does."""
+    """The files in a folder of the data set, sorted; raises StoreError as `file_inside` does."""
     paths = (file_inside(root, (folder / path.name).relative_to(root).as_posix()) for path in sorted(folder.iterdir()))
     return tuple(file for file in paths if file.is_file())
 
@@ -72,7 +70,7 @@ def is_name(text: object) -> bool:
 
 
 def names(texts: Sequence[str], what: str) -> tuple[str, ...]:
-    """The texts, which stand in paths; raises ValueError for one that is no name."""
+    """The texts, which become parts of paths; raises ValueError for an invalid name."""
     wrong = next((text for text in texts if not is_name(text)), None)
     if wrong is not None:
         raise ValueError(f"{what} {wrong!r:.100} where a name without / is expected")

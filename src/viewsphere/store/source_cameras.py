@@ -15,7 +15,7 @@ from viewsphere.model.model_spec import Axis
 
 @dataclass(frozen=True)
 class Drafted:
-    """A model of which the data set has no file of its own: a name for one, of letters, digits, `_` and `/`, and its bytes."""
+    """A model without a file in the data set: a file name of letters, digits, `_` and `/`, and the file's bytes."""
 
     name: str
     data: bytes
@@ -23,7 +23,7 @@ class Drafted:
 
 @dataclass(frozen=True)
 class SourceModel:
-    """A model of the data set, whose axes and origin are those of its file, of which `unit` metres are one unit.
+    """A model of the data set, in the axes and with the origin of its file; one unit of the file is `unit` metres.
 
     `name` begins its key; `symmetries` are in the file's axes and unit.
     """
@@ -40,9 +40,9 @@ class SourceModel:
 class SourceCameras:
     """The result of a format's `again`.
 
-    `shots` are its pictures, in its world and in metres; `model` of their objects is a key of `models` here. Without any models
-    there are only cameras. `up` is the axis of its world that points up, as far as anybody knows. `formats` and `annotations`
-    are what a recipe says to write the format again; `notes` are lines for whoever reads the recipe.
+    `shots` are its pictures, in its world and in metres; the `model` of their objects is a key of `models` here. Without
+    models, the shots have only cameras. `up` is the axis of its world that points up, if known. `formats` and `annotations` are
+    the recipe's values for writing the format again; `notes` are lines for readers of the recipe.
     """
 
     name: str

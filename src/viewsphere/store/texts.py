@@ -1,4 +1,4 @@
-"""JSON that a stranger may have written."""
+"""Parsing of untrusted JSON."""
 
 from __future__ import annotations
 
@@ -10,15 +10,15 @@ from typing import Any
 import numpy as np
 
 MOST_NESTED = 200
-"""Lists and objects in one another: more would end what walks through them, and no data set has a tenth of it."""
+"""Largest nesting of lists and objects: more would exceed the recursion limit, and no data set has a tenth of it."""
 
 _HALF = re.compile(r"\\u[dD][89a-fA-F]")
 """Start of the escape of an unpaired UTF-16 surrogate, which is not a character."""
 
 
 def parsed(text: str | bytes, parse_constant: Callable[[str], Any] | None = None) -> Any:
-    """The value in a JSON text, UTF-8 where it is bytes. Raises ValueError for any other text, for one nested too deeply,
-    and for one with halves of characters, which no other file could hold. `parse_constant` as for `json.loads`.
+    """The value of a JSON text; bytes are read as UTF-8. Raises ValueError for invalid or too deeply nested JSON, and for
+    unpaired surrogates, which no other file could hold. `parse_constant` as for `json.loads`.
     """
     if isinstance(text, bytes):
         text = text.decode("utf-8-sig")

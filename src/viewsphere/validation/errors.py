@@ -20,7 +20,7 @@ Path = tuple[str | int, ...]
 EXPLAINED = "explained"
 
 MOST_LISTED = 80
-"""Valid names that a message lists: more than the zoo has families, fewer than a folder has models."""
+"""Number of valid names that a message lists: enough for all families of the zoo, fewer than a folder of models may have."""
 
 
 class Place(NamedTuple):
@@ -35,8 +35,8 @@ class Place(NamedTuple):
 
 @dataclass(frozen=True)
 class Marks:
-    """The places of a recipe's values in its file and in the files that it extends. All marks compare equal: places are no part
-    of a recipe's meaning.
+    """The places of a recipe's values in its file and in the files that it extends. All marks compare equal, because places do
+    not change a recipe's meaning.
     """
 
     file: str = field(default="", compare=False)
@@ -50,7 +50,7 @@ class Marks:
         return self.places.get(path, Place(self.file, 1))
 
     def located(self, message: str) -> str:
-        """A message that begins with a field, `models[0].source: ...`, with file and line before it."""
+        """The message, preceded by file and line if it begins with a field, `models[0].source: ...`."""
         field_ = re.match(r"[A-Za-z_]+(?:\[\d+\]|\.\w+)*(?=: )", message)
         written = [path for path in self.places if path and _begins(message, dotted(path))]
         if not self.file or not (field_ or written):
@@ -59,7 +59,7 @@ class Marks:
 
 
 def _begins(message: str, written: str) -> bool:
-    """Return whether a message begins with this field, or with one inside of it."""
+    """Return whether a message begins with this field, or with a field inside it."""
     return message.startswith(written) and re.match(r"(?:[.[][^:]*)?: ", message[len(written) :]) is not None
 
 
@@ -70,8 +70,8 @@ def nearest(name: object, known: Iterable[str]) -> str:
 
 
 class Nearest:
-    """`nearest` for mistakes that are reported together: compares only as many different names as are shown, so that a wrong
-    table of thousands of names takes no longer than its reading.
+    """`nearest` for errors that are reported together. Compares only as many names as the report shows, so that a wrong table
+    of thousands of names costs no time.
     """
 
     def __init__(self) -> None:
@@ -91,7 +91,7 @@ def one_of(name: object, known: Sequence[str]) -> str:
 
 
 def different(one: Mapping[str, Any], other: Mapping[str, Any], most: int = 5) -> list[str]:
-    """The fields, `most` at most, in which two plain recipes differ, as `viewpoints.azimuth`; further ones as a number."""
+    """The fields in which two plain recipes differ, as `viewpoints.azimuth`: at most `most`, then the number of others."""
     paths = [dotted(steps) for steps in _different(one, other, ())]
     return paths if len(paths) <= most else [*paths[:most], f"{len(paths) - most} more"]
 
@@ -120,7 +120,7 @@ def shown(value: object) -> str:
 
 
 def explained(error: ValidationError, fields: Sequence[str], steps: Path = ()) -> ValidationError:
-    """The same mistakes in their final words; `fields`: the model's field names; `steps`: the path to the model."""
+    """The same errors with their final messages; `fields`: the model's field names; `steps`: the path to the model."""
     errors = error.errors(include_url=False)
     details = [
         InitErrorDetails(
@@ -136,7 +136,7 @@ def explained(error: ValidationError, fields: Sequence[str], steps: Path = ()) -
 
 @contextmanager
 def error_at(*steps: str | int) -> Generator[None]:
-    """Turn a ValueError about one part of a value into a ValidationError that has the part's place."""
+    """Turn a ValueError about part of a value into a ValidationError with the location of that part."""
     try:
         yield
     except ValidationError as error:
@@ -153,13 +153,13 @@ def mistakes_at(told: Mapping[Path, str]) -> ValidationError:
 
 
 def first_of(error: ValidationError) -> str:
-    """The first mistake, without its place: `expected ...; found ...`."""
+    """The first error, without its location: `expected ...; found ...`."""
     return _words(error.errors(include_url=False)[0], ())
 
 
 @contextmanager
 def told_of(where: str) -> Generator[None]:
-    """Tell a value that is out of bounds as a RecipeError that begins with `where`."""
+    """Turn an error about a value out of bounds into a RecipeError that begins with `where`."""
     try:
         yield
     except ValidationError as error:
@@ -182,7 +182,7 @@ def _follows(error: ErrorDetails, errors: Sequence[ErrorDetails], fields: Sequen
 
 
 def report(error: ValidationError, data: object, marks: Marks | None = None) -> str:
-    """Return the mistakes, a line each in the file's order: `recipe.yaml:12: models[0].categry: expected ...`."""
+    """Return the errors in the file's order, a line each: `recipe.yaml:12: models[0].categry: expected ...`."""
     lines: list[tuple[Place, str]] = []
     for e in error.errors(include_url=False):
         path = _path_in(data, e["loc"]) + _below(e)
@@ -193,7 +193,7 @@ def report(error: ValidationError, data: object, marks: Marks | None = None) -> 
 
 
 def read_options(kind: type[Options], given: Mapping[str, Any], field: str) -> Options:
-    """A plug-in's options as its class of them reads them; raises RecipeError, whose mistakes are of `field`."""
+    """A plug-in's options, read by its class of options; raises RecipeError, whose errors refer to `field`."""
     try:
         return kind.model_validate(given)
     except ValidationError as error:
@@ -202,12 +202,12 @@ def read_options(kind: type[Options], given: Mapping[str, Any], field: str) -> O
 
 
 def _under(field: str, line: str) -> str:
-    """A mistake of an option as one of the field's; `recipe` stands for all options."""
+    """An error about an option, rewritten as an error about the field; `recipe` means all options."""
     return f"{field}{line.removeprefix('recipe')}" if line.startswith("recipe: ") else f"{field}.{line}"
 
 
 def dotted(path: Path) -> str:
-    """A path as text, `models[0].category`, in one line whatever its names are; `recipe` for the empty path."""
+    """A path as text, `models[0].category`, always in one line; `recipe` for the empty path."""
     text = "".join(f"[{p}]" if isinstance(p, int) else f".{p if p.isprintable() else shown(p)}" for p in path)
     return text.removeprefix(".") or "recipe"
 
@@ -275,7 +275,7 @@ def _words(error: ErrorDetails, fields: Sequence[str]) -> str:
 
 
 def _plain(message: str) -> str:
-    """Pydantic's message of what it expected, in this project's words."""
+    """Pydantic's message about the expected value, in this project's words."""
     message = message.removeprefix("Input should be ").removeprefix("expected ")
     for theirs, ours in (("a valid ", "a "), ("String should", "text that should"), ("callable", "a function")):
         message = message.replace(theirs, ours)

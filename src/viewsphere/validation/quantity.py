@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 MOST_NAMED = 5
-"""Names of a list that a line shows; a reader skips more of them."""
+"""Number of names that a line shows; readers skip longer lists."""
 
 
 def quantity(number: int, noun: str, plural: str = "") -> str:
-    """The number and its noun: `1 frame`, `1,200 frames`; `plural` where that is not the noun with an s."""
+    """The number and its noun: `1 frame`, `1,200 frames`; `plural` is for irregular plurals."""
     return f"{number:,} {noun if number == 1 else plural or f'{noun}s'}"
 
 

@@ -61,10 +61,10 @@ OPPOSITES = (
     ("min", "max"), ("upper", "lower"), ("inner", "outer"), ("left", "right"), ("front", "back"), ("on", "off"), ("in", "out"),
     ("+", "-"), ("near", "far"), ("before", "after"), ("forward", "backward"), ("first", "last"), ("up", "down"),
 )  # fmt: skip
-"""Words of which one turns the other's meaning round, however few letters differ."""
+"""Words with opposite meanings that differ in few letters; they never suggest one another."""
 
 CLOSE = ((4, 1), (9, 2), (99, 3))
-"""Longest name, and the edits allowed in it. With one edit more, `elephant` suggests `plant`, and `--size` `--seed`."""
+"""Longest name for each number of allowed edits. With one edit more, `elephant` suggests `plant`, and `--size` `--seed`."""
 
 
 def suggestion(name: object, known: Iterable[str]) -> str | None:
@@ -102,7 +102,7 @@ def _versioned(name: str, names: Iterable[str]) -> str | None:
 
 
 def _begun(name: str, names: Iterable[str]) -> str | None:
-    """The shortest name that begins with this one, or has it as one of its words; two letters often begin several."""
+    """The shortest name that begins with this one, or contains it as a word; two letters are often ambiguous."""
     lower = name.lower()
     begun = [
         candidate

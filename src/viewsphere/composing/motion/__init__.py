@@ -1,8 +1,7 @@
-"""Motions: where a thing is at a time, and what of its file it shows. A kind is one module with a `MotionSpec`;
-none imports another.
+"""Motions: the pose and the time step of a thing at a time. A kind is one module with a `MotionSpec`; none imports another.
 
-What a kind needs stands here: what it is asked (`Start`, `Pose`), where it may go (`Lane`, `curve_through`), and how it
-turns on its way (`headed`). What a recipe says becomes a thing's motion by `mover`.
+Kinds import from here: their inputs (`Start`, `Pose`), paths (`Lane`, `curve_through`), and turning along a path (`headed`).
+`mover` turns a recipe's motions into the motion of a thing.
 """
 
 from __future__ import annotations
@@ -38,6 +37,6 @@ Amplitude = Drawn[tuple[Drawn[Strength], Drawn[Strength], Drawn[Strength]]]
 """Amplitudes to either side, along or about x, y and z; 0 or more."""
 
 Move = Callable[[float, Pose], Pose | None]
-"""The pose at a time, seconds from the sequence's first instant, of a thing that is at a pose without this motion; None where
-it is not there. Called for any times in any order.
+"""Returns the pose at a time, seconds from the sequence's first instant, given the thing's pose without this motion; None while
+the thing is absent. Called for any times in any order.
 """

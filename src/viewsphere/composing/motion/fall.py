@@ -21,8 +21,8 @@ class Options(Frozen):
 
 
 def moves(options: Options, start: Start) -> Move:
-    """The states of the simulation, straight from each to the next. All things of a scene fell together: options that differ
-    between them show them in one another.
+    """The simulated states, with linear interpolation between them. All things of a scene fell together, so that different
+    options for them make them overlap.
     """
     way = start.way
     if way is None:

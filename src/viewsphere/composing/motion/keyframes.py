@@ -45,8 +45,8 @@ class Key(Frozen):
 
 
 class Options(Frozen):
-    """Positions and rotations at given times, straight and evenly from each to the next. Before the first key it is as there,
-    after the last as there.
+    """Positions and rotations at given times, with linear interpolation. The first key holds before its time, the last one
+    after its time.
     """
 
     keys: Annotated[tuple[Key, ...], Field(min_length=1)] = Field(description="in the order of their times")
@@ -88,7 +88,7 @@ def moves(options: Options, start: Start) -> Move:
 
 
 def _between(keys: list[tuple[float, Float]], time: float, ease: str) -> tuple[Float, Float, float]:
-    """The values of the keys around a time, and the share of the way between them."""
+    """The values of the keys before and after a time, and the position between them, 0 to 1."""
     after = bisect_right(keys, time, key=lambda key: key[0])
     if after in (0, len(keys)):
         end = keys[min(after, len(keys) - 1)][1]

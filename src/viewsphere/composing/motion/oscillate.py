@@ -16,7 +16,7 @@ from viewsphere.recipe.draws import Coordinate, Drawn
 
 
 class Options(Frozen):
-    """To and fro, as the sine of time: at 0 s in the middle, where it is without this motion, unless phase_deg says more."""
+    """Oscillation, as the sine of time: at 0 s in the middle, the pose without this motion, unless phase_deg shifts it."""
 
     position: Amplitude = Field(default=(0.0, 0.0, 0.0), description="[x, y, z]: amplitude in metres along the world's axes")
     rotation_deg: Amplitude = Field(

@@ -1,4 +1,4 @@
-"""Along a lane of the place, or along points of the world, its front ahead."""
+"""Along a lane of the place, or along points of the world, with the front ahead."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ ANY = "any"
 
 
 class Options(Frozen):
-    """Along a lane of the place, or along points of the world, at a constant speed. It keeps its height above z = 0 above its
-    way.
+    """Along a lane of the place, or along points of the world, at a constant speed. The thing keeps its height above z = 0 as
+    its height above the path.
     """
 
     lane: Drawn[Annotated[str, Field(min_length=1)]] | None = Field(
@@ -55,7 +55,7 @@ class Options(Frozen):
 
 
 def moves(options: Options, start: Start) -> Move:
-    """The way by its arc length."""
+    """The path by its arc length."""
     curve = _curve(options, start)
     if not curve.closed and options.offset > curve.length:
         raise RecipeError(
@@ -80,7 +80,7 @@ def _curve(options: Options, start: Start) -> Curve:
 
 
 def _lane(name: str, start: Start) -> Lane:
-    """The lane of this name, or one of all."""
+    """The lane of this name, or a random one."""
     lanes = {lane.name: lane for lane in start.lanes}
     if not lanes:
         raise RecipeError(

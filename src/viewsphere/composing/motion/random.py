@@ -1,4 +1,4 @@
-"""Smoothly at random, around where it is without this motion."""
+"""Smooth random motion around the pose without this motion."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from viewsphere.recipe.draws import Drawn
 
 
 class Options(Frozen):
-    """Smoothly at random around where it is: no faster than the highest frequency, no farther than the amplitudes."""
+    """Smooth random motion around the pose without it, bounded by the highest frequency and the amplitudes."""
 
     position: Amplitude = Field(
         default=(0.0, 0.0, 0.0), description="[x, y, z]: largest amplitude in metres along the world's axes"

@@ -1,8 +1,8 @@
 """Rigid bodies that fall and come to rest, by MuJoCo (Todorov, Erez, Tassa 2012; version 3.3 or newer).
 
-The settings are measured ones: with MuJoCo's own a pile of models creeps on for ever. They are lengths and seconds, so that
-every world is simulated as if its typical body were `TYPICAL` metres long, and scaled back: free fall only changes its clock.
-Frame: metres, +Z up, the floor at z = 0.
+The settings were tuned by measurements: with MuJoCo's defaults, a pile of models creeps for ever. They are lengths and seconds,
+so that every world is simulated with its typical body `TYPICAL` metres long, and scaled back: for free fall, this only changes
+the clock. Frame: metres, +Z up, the floor at z = 0.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from viewsphere.composing.physics._body import Board, Body, Touch, body_of, need
 from viewsphere.composing.physics._world import CALM_LOOKS, DAMPED_S, LONGEST_S, STEP_S, TYPICAL, World
 
 EDITION = "physics 5"
-"""Raised when the same bodies come to rest elsewhere than before: what was simulated and kept is told apart by it."""
+"""Version of the simulation, raised when the same bodies come to rest elsewhere than before; distinguishes stored results."""
 
 __all__ = [
     "CALM_LOOKS",

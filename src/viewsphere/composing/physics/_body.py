@@ -27,7 +27,7 @@ class Touch:
 
     @property
     def damping_ratio(self) -> float:
-        """Of the damped spring that gives back this share of the speed in half a swing."""
+        """The damping ratio of a spring that returns this share of the speed after half a swing."""
         if self.restitution == 0:
             return 1.0
         log = math.log(self.restitution)
@@ -49,14 +49,14 @@ class Body:
 
     @property
     def volumes(self) -> Float:
-        """Of each part, cubic metres."""
+        """Volume of each part, cubic metres."""
         return np.array([_volume(corners, triangles) for corners, triangles in self.parts])
 
 
 @dataclass(frozen=True)
 class Board:
-    """A box that stands still: its middle and half its sizes, metres, and how far it is turned about the vertical, radians. One
-    that `is_fence` holds bodies in while they fall, and is gone when they have come to rest.
+    """A fixed box: its middle and half sizes, metres, and its turn about the vertical, radians. A board with `is_fence` keeps
+    bodies inside while they fall, and is removed when they have come to rest.
     """
 
     center: tuple[float, float, float]
@@ -91,7 +91,7 @@ def _hull(points: Float) -> tuple[Float, NDArray[np.int32]]:
 
 
 def _thickened(points: Float) -> Float:
-    """The points, and each a little to all sides."""
+    """The points, each repeated with small offsets to all sides."""
     by = FLAT / 2 * float(np.ptp(points, axis=0).max() or 1.0)
     return np.concatenate([points + by * side for axis in np.eye(3) for side in (axis, -axis)])
 

@@ -30,35 +30,34 @@ LOOK = 25
 CALM_LOOKS = 12
 CALM_SPEED, CALM_TURN = 0.03, 0.3
 CALM_WAY, CALM_ANGLE = 0.0003, 0.002
-"""Bodies seem to be at rest when so many looks found them slower than this, metres and radians a second, and they went no
-farther from the first to the last. The speeds are those of a thing that trembles on the spot, from one corner that touches to
-the next.
+"""Bodies seem to be at rest if this many checks in a row found them slower than this, metres and radians a second, and they
+moved no farther in total. The speeds are those of a thing that trembles on the spot, from one touching corner to the next.
 """
 
 REST_S, REST_WAY, REST_ANGLE = 1.0, 0.0009, math.radians(0.45)
-"""They are at rest when they are let go there and stay so near, metres and radians, for so many seconds, all of them the
-world's and not those that are simulated: what stands on an edge falls a moment later.
+"""Bodies are at rest if, released from there, they stay within this distance, metres and radians, for this many seconds. All
+are in the world's scale, not the simulation's. The wait is needed because a body on an edge falls a moment later.
 """
 
 ASLEEP = 0.006
-"""Bodies that settle and are slower than this for ten steps, metres a second, stay as they are until something moves against
-them, and cost nothing (MuJoCo 3.4 and newer). Whether all are at rest is looked at with all of them awake.
+"""Bodies that settle and are slower than this, metres a second, for ten steps sleep until something touches them, and cost no
+time (MuJoCo 3.4 and newer). The check for rest wakes all of them.
 """
 
 DAMPED_S, DAMPING = 2.0, 4.0
-"""Seconds after which bodies that settle lose a share of their speed, and how much of it a second: boats rock on otherwise. No
-look that finds them at rest is helped so.
+"""Seconds after which settling bodies are damped, and the share of speed that they lose per second: boats would rock on
+otherwise. The check for rest runs without this damping.
 """
 
 LONGEST_S = 15.0
-"""Simulated seconds after which bodies that still move are given up."""
+"""Simulated seconds after which the search for rest ends without success."""
 
 HULL_CORNERS = 256
-"""Of a part at most: fewer would cut off millimetres, which then stand in others."""
+"""Largest number of corners of a part: fewer would cut off millimetres, which then overlap other bodies."""
 
 SPINNING, ROLLING = 0.005, 0.002
 """Friction against spinning on the spot, and against any turning, metres: the latter is a torque on a body, of its weight at
-this distance. As a part of each contact it takes two more rows of the solver's for each, and half as much time again.
+this distance. As a part of each contact, it adds two rows to the solver for each, and half as much time again.
 """
 
 STIFF, GRIP = 0.95, 100.0
@@ -69,7 +68,7 @@ either is less. MuJoCo's iterations against slipping, which make up for a grip o
 
 class World:
     """Bodies in a gravity of 9.81 m/s2 on a floor, among boards and bodies that are `fixed`. `typical` is the length of its
-    typical body, metres. Where `floor` is below 0, z = 0 is only the top of a board.
+    typical body, metres. If `floor` is below 0, z = 0 is only the top of a board.
     """
 
     def __init__(
@@ -88,15 +87,15 @@ class World:
         self.begin(poses)
 
     def begin(self, poses: Sequence[Matrix4]) -> None:
-        """Let the bodies go from these poses, as in a new world; fences that were taken away stay away."""
+        """Release the bodies from these poses, as in a new world; removed fences stay removed."""
         self._fall_asleep(False)
         self._data, self._steps = self._mujoco.MjData(self._model), 0
         for number, pose in enumerate(poses):
             self.put(number, pose)
-        self._mujoco.mj_forward(self._model, self._data)  # places what stands still: no step does, once bodies sleep
+        self._mujoco.mj_forward(self._model, self._data)  # places fixed bodies: steps do not once bodies sleep
 
     def _fall_asleep(self, may: bool) -> None:
-        """Let bodies that hardly move sleep, or wake all."""
+        """Let slow bodies sleep, or wake all."""
         if sleep := int(getattr(self._mujoco.mjtEnableBit, "mjENBL_SLEEP", 0)):
             flags = self._model.opt.enableflags
             self._model.opt.enableflags, self._model.opt.sleep_tolerance = flags | sleep if may else flags & ~sleep, ASLEEP
@@ -138,24 +137,24 @@ class World:
             made.add_geom(type=mujoco.mjtGeom.mjGEOM_MESH, meshname=mesh.name, mass=mass, priority=1, **_contact(body.touch))
 
     def put(self, number: int, pose: Matrix4) -> None:
-        """Put a body, by its number, somewhere else, where it is at rest."""
+        """Move a body, given by its number, to another pose, without velocity."""
         matrix = np.array(pose)
         at, speed = self._data.qpos.reshape(-1, 7)[number], self._data.qvel.reshape(-1, 6)[number]
         at[:3], at[3:], speed[:] = matrix[:3, 3] * self._scale, quaternion_from_matrix(matrix[:3, :3]), 0.0
 
     def take_fences_away(self) -> None:
-        """Let bodies go where fences were."""
+        """Remove the fences."""
         for number in self._fences:
             self._model.geom_contype[number] = self._model.geom_conaffinity[number] = 0
         self._fences = []
 
     @property
     def seconds(self) -> float:
-        """Seconds that went by in the world."""
+        """Elapsed seconds of the world."""
         return self._steps * STEP_S / self._scale**0.5
 
     def step(self, steps: int = 1) -> None:
-        """Let so much time go by."""
+        """Simulate this number of steps."""
         self._mujoco.mj_step(self._model, self._data, steps)
         self._steps += steps
 
@@ -173,9 +172,9 @@ class World:
         ends: Callable[[], bool] | None = None,
         is_calm: bool = False,
     ) -> bool:
-        """Let time go by until all bodies stay where they are for `rest_s` of the world's seconds, and go back to when that
-        began; whether it begins before so many simulated ones are over, and before `ends` says that all is of no use. `look`
-        is called every so many steps, and `ends` after it. is_calm: whether they seem to be at rest when this begins.
+        """Simulate until all bodies stay in place for `rest_s` seconds of the world, then return to the start of this rest.
+        Returns whether rest begins within `longest_s` simulated seconds and before `ends` returns true. Every `each` steps,
+        `look` and then `ends` are called. is_calm: whether the bodies seem to be at rest at the beginning.
         """
         calm, tried, begun, step = list[Float](), None, self._steps, 0
         self._fall_asleep(not is_calm)
@@ -210,7 +209,7 @@ class World:
         return False
 
     def _begin_at(self, state: Float, steps: int) -> None:
-        """Put all bodies at rest and awake in a state (N, 7), which was after so many steps."""
+        """Put all bodies, awake and without velocity, into a state (N, 7), and set the number of elapsed steps."""
         self._fall_asleep(False)
         self._data.qpos[:], self._data.qvel[:], self._steps = state.ravel(), 0.0, steps
         self._mujoco.mj_forward(self._model, self._data)
@@ -222,7 +221,7 @@ class World:
 
     @property
     def speed(self) -> float:
-        """Metres a second of the fastest body."""
+        """Speed of the fastest body, metres a second."""
         return float(np.linalg.norm(self._data.qvel.reshape(-1, 6)[:, :3], axis=1).max()) / self._scale**0.5
 
     @property
@@ -239,21 +238,23 @@ class World:
 
     @property
     def deepest(self) -> float:
-        """Metres that bodies that are awake overlap one another, boards or the floor, at most."""
+        """Largest overlap of awake bodies with one another, boards or the floor, metres."""
         distances = self._data.contact.dist[: self._data.ncon]
         return max(0.0, -float(distances.min())) / self._scale if len(distances) else 0.0
 
     @property
     def touching(self) -> frozenset[tuple[int, int]]:
-        """Pairs of numbers of bodies that touch, the lower one first, one of them awake; -1 is what stands still."""
+        """Pairs of numbers of touching bodies, at least one of them awake, the lower number first; -1 stands for fixed
+        objects.
+        """
         owner = self._model.geom_bodyid - 1
         pairs = self._data.contact.geom[: self._data.ncon]
-        owner[owner >= self._bodies] = -1  # what is fixed
+        owner[owner >= self._bodies] = -1  # fixed objects
         return frozenset((int(min(p)), int(max(p))) for p in owner[pairs])
 
 
 def _are_near(before: Float, now: Float, way: float, angle: float) -> bool:
-    """Return whether all bodies went less far, and turned less, between two states (N, 7)."""
+    """Return whether all bodies moved and turned by less than these limits between two states (N, 7)."""
     gone = np.linalg.norm(now[:, :3] - before[:, :3], axis=1)
     half = np.abs((now[:, 3:] * before[:, 3:]).sum(axis=1)).clip(0, 1)
     return bool(gone.max() < way and 2 * np.arccos(half.min()) < angle)

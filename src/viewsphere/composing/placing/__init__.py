@@ -1,7 +1,7 @@
-"""Placers: where models that share a frame stand. A placer is one module with a `PlacerSpec`; none imports another.
+"""Placers: the places of models that share a frame. A placer is one module with a `PlacerSpec`; none imports another.
 
-What a placer needs stands here: what it is asked (`Room`, `Shape`, `Draws`), and geometry on the floor (`Footprint`,
-`standing`, `checked`).
+Placers import from here: their inputs (`Room`, `Shape`, `Draws`), and geometry on the floor (`Footprint`, `standing`,
+`checked`).
 """
 
 from __future__ import annotations
@@ -46,8 +46,8 @@ __all__ = [
 
 
 class Draws(Protocol):
-    """Makes the generator of what is drawn for these names, such as a slot and a model's key. Equal names, equal draws: a
-    placer that names what it draws for moves nothing else when a model joins the recipe.
+    """Makes the generator for these names, such as a slot and a model's key. Equal names give equal draws: a placer that names
+    each draw moves no other model when a model joins the recipe.
     """
 
     def __call__(self, *names: str) -> np.random.Generator:
@@ -62,8 +62,8 @@ def draws_of(rng: Draws, *names: str) -> RngOf:
 
 @dataclass(frozen=True)
 class Piece:
-    """A piece of scenery that a placer needs: the source of a model that is built to a size, (width, height, length) in
-    metres, and where it stands.
+    """A piece of scenery that a placer needs: the source of a model that is built to a size, (width, height, length) in metres,
+    and its pose.
     """
 
     source: str
@@ -73,13 +73,13 @@ class Piece:
 
 @dataclass(frozen=True)
 class Way:
-    """The states of a thing at moments that follow one another, seconds from its first; it stays in the last one."""
+    """The states of a thing at ascending times, seconds from the first; it stays in the last one."""
 
     seconds: tuple[float, ...]
     states: tuple[State, ...]
 
     def at(self, seconds: float) -> Matrix4:
-        """World from object at a time: straight from state to state."""
+        """World from object at a time, interpolated linearly between states."""
         after = min(max(bisect_right(self.seconds, seconds), 1), len(self.states) - 1)
         a, b = np.array(self.states[after - 1]), np.array(self.states[after])
         begin, stop = self.seconds[after - 1], self.seconds[after]

@@ -1,4 +1,4 @@
-"""Between the camera and the model that they join, which they hide in part: company that is drawn for each frame."""
+"""Between the camera and the frame's model, which is partly hidden: for company that is drawn for each frame."""
 
 from __future__ import annotations
 
@@ -22,11 +22,11 @@ from viewsphere.plugins.placer import PlacerSpec
 from viewsphere.recipe.draws import Drawn, drawn
 
 TRIES = 200
-"""Spots that are tried for one thing; each is a little farther from the model."""
+"""Number of tried spots for one thing; each is a little farther from the model."""
 
 
 class Options(Frozen):
-    """The position of an object in the line of sight."""
+    """The options for objects in the line of sight."""
 
     stand: Literal["floor", "sight"] = Field(
         default="floor", description="floor: on the floor; sight: in the air on the line of sight, for cameras high above"
@@ -40,8 +40,8 @@ class Options(Frozen):
 def place(
     cast: Sequence[ModelSpec], room: Room, shapes: Sequence[Shape], views: Sequence[Camera], rng: Draws, options: Options
 ) -> Sequence[Matrix4]:
-    """Poses turned at random, as near to the model as the gap allows, or a little farther; raises RecipeError where there is no
-    room, or no camera is known.
+    """Poses turned at random, as near to the model as the gap allows, or a little farther; raises RecipeError if there is not
+    enough room, or no known camera.
     """
     if room.seen_from is None or not room.taken:
         raise RecipeError(

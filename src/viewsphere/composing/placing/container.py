@@ -1,4 +1,4 @@
-"""Dropped into an open box of five boards, which is drawn as background, and come to rest."""
+"""Dropped into an open box of five boards, which is part of the background, and come to rest."""
 
 from __future__ import annotations
 
@@ -24,10 +24,10 @@ from viewsphere.plugins.source import model_for
 from viewsphere.recipe.draws import Drawn, drawn
 
 FULL = 0.5
-"""Share of a box's room that hulls of models which lie as they fall may fill at most; packings of alike ones reach 0.6."""
+"""Largest share of a box's volume for the hulls of randomly fallen models; packings of equal models reach 0.6."""
 
 ROOMY = 0.5
-"""Share of its room that the boxes of the models fill of a box whose size is not said."""
+"""Share of a box's volume filled by the models' boxes, if the recipe gives no size."""
 
 
 class Options(Matter):
@@ -41,7 +41,7 @@ class Options(Matter):
 def place(
     cast: Sequence[ModelSpec], room: Room, shapes: Sequence[Shape], views: Sequence[Camera], rng: Draws, options: Options
 ) -> Sequence[Matrix4]:
-    """Poses at rest in the box; raises RecipeError for one that is too small."""
+    """Poses at rest in the box; raises RecipeError if the box is too small."""
     return poses_of(_fallen(cast, room, shapes, rng, options))
 
 
@@ -83,7 +83,7 @@ def _size(shapes: Sequence[Shape], rng: Draws, options: Options) -> tuple[float,
 
 
 def _check(cast: Sequence[ModelSpec], room: Room, shapes: Sequence[Shape], size: tuple[float, float, float]) -> None:
-    """Raise RecipeError if the box cannot hold the models, or has no place itself."""
+    """Raise RecipeError if the box cannot hold the models, or does not fit into the room."""
     where, (width, height, length) = f"{room.field}.layout", size
     if room.taken:
         raise RecipeError(f"{where}: expected no container for company, as the model that it joins is not in it; set scenes")

@@ -1,4 +1,4 @@
-"""Dropped on the floor, or on what stands there, and come to rest; or caught while they fall."""
+"""Dropped on the floor, or on things already there, and come to rest; or caught while they fall."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ LOOSE = 2.0
 """Floor area over which things are dropped, in multiples of their boxes' total."""
 
 TOP = 0.03
-"""Metres that a surface above the floor is thick."""
+"""Thickness of a surface above the floor, metres."""
 
 
 class Options(Matter):
@@ -42,7 +42,7 @@ class Options(Matter):
 def place(
     cast: Sequence[ModelSpec], room: Room, shapes: Sequence[Shape], views: Sequence[Camera], rng: Draws, options: Options
 ) -> Sequence[Matrix4]:
-    """Poses at rest, or in flight; raises RecipeError where things do not come to rest, or not on what is free."""
+    """Poses at rest, or in flight; raises RecipeError if things do not come to rest on the free surface."""
     return poses_of(_fallen(cast, room, shapes, rng, options))
 
 
@@ -62,7 +62,7 @@ def _fallen(cast: Sequence[ModelSpec], room: Room, shapes: Sequence[Shape], rng:
 
 
 def _region(room: Room, shapes: Sequence[Shape], rng: Draws, options: Options) -> Footprint:
-    """The floor over which things are let go, on what is free."""
+    """The part of the free floor over which things are dropped."""
     if options.spread is not None:
         wide, long = drawn(options.spread, draws_of(rng))
     else:

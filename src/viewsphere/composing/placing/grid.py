@@ -1,4 +1,4 @@
-"""In the cells of a grid around what stands there before or around the origin, the nearest first, all facing -Y."""
+"""In the cells of a grid around things already in place or around the origin, the nearest cells first, all facing -Y."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ from viewsphere.plugins.placer import PlacerSpec
 def place(
     cast: Sequence[ModelSpec], room: Room, shapes: Sequence[Shape], views: Sequence[Camera], rng: Draws
 ) -> Sequence[Matrix4]:
-    """Poses with the middle of each box in the middle of a cell, the room's gap between cells; what stands there before has the
+    """Poses with the middle of each box in the middle of a cell, the room's gap between cells; a thing already in place has the
     first cell.
 
-    All cells are as wide and as long as the largest boxes. Raises RecipeError where the grid leaves the free floor.
+    All cells are as wide and as long as the largest boxes. Raises RecipeError if the grid exceeds the free floor.
     """
     whole = [*room.prints, *(footprint(shape.box, standing(shape.box)) for shape in shapes)]
     wide, long = (2 * max(float(own.half[k]) for own in whole) + room.gap for k in (0, 1))
@@ -33,7 +33,7 @@ def place(
 
 
 def _cells(count: int) -> list[tuple[int, int]]:
-    """Columns and lines of so many cells, from the middle outwards; of those equally far, the front and the left come first."""
+    """Columns and rows of this many cells, from the middle outwards; of equally distant cells, front and left come first."""
     reach = math.isqrt(count) + 1
     side = range(-reach, reach + 1)
     return sorted(product(side, side), key=lambda cell: (cell[0] ** 2 + cell[1] ** 2, cell[1], cell[0]))[:count]

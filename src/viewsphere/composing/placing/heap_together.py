@@ -1,4 +1,4 @@
-"""Close by, turned at random: one after another, uniform in a circle that grows until there is room."""
+"""Close together, turned at random: one after another, uniform in a circle that grows until there is room."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ class Options(Gaps):
 def place(
     cast: Sequence[ModelSpec], room: Room, shapes: Sequence[Shape], views: Sequence[Camera], rng: Draws, options: Options
 ) -> Sequence[Matrix4]:
-    """Poses near the middle, or near what stands there before; raises RecipeError where no spot is found for one."""
+    """Poses near the middle, or near things already in place; raises RecipeError if no spot is found for a model."""
     return scattered(cast, room, shapes, rng, options, free_spot)
 
 

@@ -17,7 +17,7 @@ def place(
 ) -> Sequence[Matrix4]:
     """Poses at the room's spots, one for each of the cast.
 
-    Raises RecipeError for another number of spots, and where things would stand in one another or beyond the free floor.
+    Raises RecipeError for another number of spots, and if things would overlap or be beyond the free floor.
     """
     if len(room.spots) != len(cast):
         raise RecipeError(f"{room.field}.layout: expected a list of {len(cast)} spots [x, y, azimuth]; found {len(room.spots)}")

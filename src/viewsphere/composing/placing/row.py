@@ -1,4 +1,4 @@
-"""Side by side along X, right and left in turn of what stands there before or of the first, all facing -Y."""
+"""Side by side along X, alternately right and left of a thing already in place or of the first one, all facing -Y."""
 
 from __future__ import annotations
 

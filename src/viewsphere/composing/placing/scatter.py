@@ -1,5 +1,5 @@
-"""Spread over the free floor, turned at random: uniform over all spots that are clear; on an endless floor, and beside a model
-that company joins, close by, as `heap_together`.
+"""Spread over the free floor, turned at random: uniform over all clear spots; on an endless floor, and for company of a model,
+close together as in `heap_together`.
 """
 
 from __future__ import annotations
@@ -22,7 +22,9 @@ from viewsphere.plugins.placer import PlacerSpec
 from viewsphere.recipe.draws import Drawn, drawn
 
 NEAR = 10.0
-"""Metres from the middle in which models stand where they have room: cameras look there, and a street is 200 m long."""
+"""Radius around the middle, in metres, for models that have room there: cameras look at the middle, and a street is 200 m
+long.
+"""
 
 LOOSE = 8.0
 """Ratio of the floor's area to that of the models' boxes: 20 cars in a street with furniture find room at the first draw."""
@@ -67,7 +69,7 @@ def _roomy(free: Footprint, shapes: Sequence[Shape]) -> Footprint:
 
 
 def _within(floor: Footprint, reach: float) -> Footprint:
-    """The part of a floor that is so near to the origin along its axes; all of one that is wholly farther away."""
+    """The part of a floor within `reach` of the origin along its axes; all of it if the whole floor is farther away."""
     middle = floor.axes @ floor.center
     low, high = np.maximum(middle - floor.half, -reach), np.minimum(middle + floor.half, reach)
     if (high <= low).any():

@@ -1,4 +1,4 @@
-"""Piled on one another: piles that stand by themselves, each in a spot of its own."""
+"""Stacked in stable piles, each at its own spot."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ Float = NDArray[np.float64]
 
 
 TRIES = 12
-"""Orders and turns of one pile that are tried."""
+"""Number of tried orders and turns of one pile."""
 
 AIR = 0.001
 """Metres between one thing and the next when they are piled up."""
@@ -46,7 +46,7 @@ class Options(Matter):
 
 @dataclass(frozen=True, eq=False)
 class _Pile:
-    """Some of the cast (their numbers), where they stand in the pile's own axes, how many of them do, and their box."""
+    """A pile: the numbers of its cast, their poses in the pile's own axes, how many of them stand, and their box."""
 
     slots: tuple[int, ...]
     poses: tuple[Matrix4, ...]
@@ -57,7 +57,7 @@ class _Pile:
 def place(
     cast: Sequence[ModelSpec], room: Room, shapes: Sequence[Shape], views: Sequence[Camera], rng: Draws, options: Options
 ) -> Sequence[Matrix4]:
-    """Poses at rest; raises RecipeError where a pile does not stand, or has no room."""
+    """Poses at rest; raises RecipeError if a pile collapses, or has no room."""
     return poses_of(room.memory(lambda: {"poses": _piled(cast, room, shapes, rng, options)}))
 
 
@@ -86,13 +86,13 @@ def _piled(cast: Sequence[ModelSpec], room: Room, shapes: Sequence[Shape], rng: 
 
 
 def _highest(cast: Sequence[ModelSpec], shapes: Sequence[Shape], slots: range, rng: Draws, options: Options) -> _Pile:
-    """A pile of these, or of as many of the first of them as stay on one another."""
+    """A pile of these models, or of as many of the first ones as stay on one another."""
     pile = _pile(cast, shapes, tuple(slots), rng, options)
     return pile if pile.standing == len(slots) else _highest(cast, shapes, slots[:-1], rng, options)
 
 
 def _pile(cast: Sequence[ModelSpec], shapes: Sequence[Shape], slots: tuple[int, ...], rng: Draws, options: Options) -> _Pile:
-    """The first try of a pile that stands, else the one of which most does."""
+    """The first try of a pile that stands, else the try with the most standing models."""
     best: _Pile | None = None
     bodies = [_body(cast[slot], shapes[slot], slot, rng, options) for slot in slots]
     typical = float(np.median([shapes[slot].length for slot in slots]))
@@ -109,7 +109,7 @@ def _pile(cast: Sequence[ModelSpec], shapes: Sequence[Shape], slots: tuple[int, 
 
 
 def _tried(world: World, shapes: Sequence[Shape], slots: tuple[int, ...], own: np.random.Generator) -> _Pile:
-    """A pile, wide things below narrow ones but for some luck, let go."""
+    """The result of releasing a pile, in an order that is mostly wide below narrow, with some randomness."""
     areas = [math.prod(np.ptp(shapes[slot].box, axis=0)[:2]) for slot in slots]
     order = sorted(range(len(slots)), key=lambda i: -areas[i] * own.uniform(0.7, 1.4))
     top, starts = 0.0, dict[int, Matrix4]()
@@ -127,7 +127,7 @@ def _tried(world: World, shapes: Sequence[Shape], slots: tuple[int, ...], own: n
     def fallen() -> frozenset[int]:
         return frozenset(i for pair in world.touching if -1 in pair for i in pair) - {-1, order[0]}
 
-    # Only piles of which nothing fell are of use: the way down of what did is not worth its time.
+    # Only piles of which nothing fell are used, so the fall of others is not simulated to its end.
     calm = world.settle(ends=lambda: bool(fallen())) and world.deepest <= MOST_OVERLAP
     points = np.concatenate([transform(np.array(p), shapes[s].hull) for p, s in zip(world.poses, slots, strict=True)])
     box = Box3d.around(points).corners

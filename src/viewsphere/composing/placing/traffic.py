@@ -1,4 +1,4 @@
-"""On roads: vehicles along the place's lanes or parked in its bays, all else on its pavements."""
+"""On roads: vehicles along the place's lanes or parked in its bays, everything else on its pavements."""
 
 from __future__ import annotations
 
@@ -31,13 +31,13 @@ TRIES = 400
 """Spots along the lanes that are tried for one thing."""
 
 VEHICLE = 1.2
-"""Metres that a thing is long at least which drives: bicycles and longer. Persons, bins and dogs are shorter."""
+"""Least length of a thing that drives, metres: bicycles and longer. Persons, bins and dogs are shorter."""
 
 OVERHANG = 0.3
 """Metres by which a vehicle with its mirrors may be wider than its bay."""
 
 PAVEMENT = (1.5, 2.2)
-"""Metres from the right edge of a lane to where others walk, in a place that has no pavements of its own."""
+"""Metres from the right edge of a lane to the path of walkers, in places without pavements."""
 
 
 class Options(Frozen):
@@ -73,8 +73,8 @@ class _Roads:
 def place(
     cast: Sequence[ModelSpec], room: Room, shapes: Sequence[Shape], views: Sequence[Camera], rng: Draws, options: Options
 ) -> Sequence[Matrix4]:
-    """Poses along the lanes, each headed as its lane leads, walkers either way; raises RecipeError where the place has no lanes
-    or no spot is found for one.
+    """Poses along the lanes, each in its lane's direction, walkers in either; raises RecipeError if the place has no lanes, or
+    if no spot is found for a thing.
     """
     roads = _roads(room, shapes, drawn(options.reach, draws_of(rng, "reach")))
     crowd, poses = Crowd(), list[Matrix4]()
@@ -113,7 +113,7 @@ def _roads(room: Room, shapes: Sequence[Shape], reach: float) -> _Roads:
 def _free(
     draws: np.random.Generator, roads: _Roads, shape: Shape, options: Options, others: Crowd
 ) -> tuple[Matrix4, Footprint] | None:
-    """A pose on the roads, and what it covers, clear of others; None where none is found."""
+    """A pose on the roads that is clear of others, and its footprint; None if none is found."""
     drives = _size(shape)[1] >= VEHICLE
     is_parked = draws.random() < options.parked
     if drives and is_parked and options.bay is None and roads.bays:
@@ -124,7 +124,7 @@ def _free(
 
 
 def _clear(poses: Iterator[Matrix4], room: Room, shape: Shape, others: Crowd) -> tuple[Matrix4, Footprint] | None:
-    """The first pose that is clear of others, and what it covers."""
+    """The first pose that is clear of others, and its footprint."""
     for pose in poses:
         cover = footprint(shape.box, pose)
         if room.is_clear(cover, others):
@@ -133,7 +133,7 @@ def _clear(poses: Iterator[Matrix4], room: Room, shape: Shape, others: Crowd) ->
 
 
 def _in_bays(draws: np.random.Generator, bays: Sequence[Bay], shape: Shape) -> Iterator[Matrix4]:
-    """Poses in the middles of bays that are large enough, headed as these are."""
+    """Poses in the middles of bays that are large enough, in the bays' directions."""
     width, length = _size(shape)
     x, y = (-Box3d(shape.box).center[:2]).tolist()
     for i in draws.permutation(len(bays)).tolist():

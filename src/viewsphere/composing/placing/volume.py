@@ -1,4 +1,4 @@
-"""In the air: anywhere in a box above the floor, none in another, as in FlyingThings3D (Mayer et al. 2016)."""
+"""In the air: anywhere in a box above the floor, without overlaps, as in FlyingThings3D (Mayer et al. 2016)."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ TRIES = 500
 """Spots that are tried for one thing."""
 
 ROOMY = 0.08
-"""Share of its room that the boxes of the things fill of a volume whose size is not said."""
+"""Share of the volume filled by the things' boxes, if the recipe gives no size."""
 
 
 class Options(Frozen):
@@ -43,8 +43,8 @@ class Options(Frozen):
 def place(
     cast: Sequence[ModelSpec], room: Room, shapes: Sequence[Shape], views: Sequence[Camera], rng: Draws, options: Options
 ) -> Sequence[Matrix4]:
-    """Poses turned about the vertical at random, no two boxes, as they are turned, nearer than the room's gap; raises
-    RecipeError where no spot is found for one.
+    """Poses turned about the vertical at random, with no two turned boxes nearer than the room's gap; raises RecipeError if no
+    spot is found for a thing.
     """
     size, height = _extent(shapes, rng, options)
     if room.clearance is not None and height + size[2] > room.clearance:
@@ -67,7 +67,7 @@ def place(
 
 
 def _extent(shapes: Sequence[Shape], rng: Draws, options: Options) -> tuple[Float, float]:
-    """Size (3,) of the box, and how high it begins."""
+    """Size (3,) of the box, and the height of its bottom."""
     height = drawn(options.height, draws_of(rng, "height"))
     if options.size is not None:
         return np.array(drawn(options.size, draws_of(rng, "size"))), height
@@ -79,7 +79,7 @@ def _extent(shapes: Sequence[Shape], rng: Draws, options: Options) -> tuple[Floa
 def _pose(
     rng: np.random.Generator, room: Room, box: Float, others: Sequence[Float], size: Float, height: float
 ) -> Matrix4 | None:
-    """A pose clear of the others, all of it in the volume; None where none is found."""
+    """A pose clear of the others and entirely in the volume; None if none is found."""
     low = np.array([-size[0] / 2, -size[1] / 2, height])
     for _ in range(TRIES):
         turn = rotation_about((0.0, 0.0, 2 * math.pi * rng.random()))
@@ -93,8 +93,8 @@ def _pose(
 
 
 def apart(a: Float, b: Float, gap: float) -> bool:
-    """Return whether two boxes, their corners (8, 3) however they are turned, are separated by at least a gap: along a side
-    of one of them, or across two of their sides (Gottschalk, Lin, Manocha 1996).
+    """Return whether two oriented boxes with these corners (8, 3) are separated by at least a gap, along an axis of one box or
+    a cross product of two axes (Gottschalk, Lin, Manocha 1996).
     """
     sides = [(c[1] - c[0], c[3] - c[0], c[4] - c[0]) for c in (a, b)]
     crosses = (np.cross(s, t) for s, t in product(*sides))

@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 NAMES_SAID = 5
 
 Turn = Callable[[Names], int]
-"""The number of what a draw is for, in its order: of a model, or of a frame."""
+"""Returns the number of the model or frame of a draw, in the data set's order."""
 
 
 @dataclass(frozen=True)
@@ -46,8 +46,8 @@ class Labelled:
 
 @dataclass(frozen=True, eq=False)
 class BlendScenery(Sendable):
-    """The .blend file of a recipe's scene, at the frames that are asked for (none: its first), each with its `seconds`.
-    `turn_of` gives the turn of what is shown one after another.
+    """The .blend file of a recipe's scene, at the requested frames (none: its first), each with its `seconds`. `turn_of`
+    returns the number by which variants alternate.
     """
 
     recipe: Recipe
@@ -71,7 +71,7 @@ class BlendScenery(Sendable):
         if not self.path.is_file():
             raise RecipeError(f"scene.blend.file: expected a .blend file; found none at {self.path}")
         try:
-            from viewsphere.assets.scene_file import scene_file  # which loads what asks Blender
+            from viewsphere.assets.scene_file import scene_file  # which loads the modules that run Blender
 
             patterns = tuple(v.one_of for v in self.entry.variants.values())
             return scene_file(self.path, self.entry.confined, patterns, self.frames)
@@ -97,7 +97,7 @@ class BlendScenery(Sendable):
 
     @cached_property
     def labelled(self) -> tuple[Labelled, ...]:
-        """The labelled objects that renders show anything of at any time, by their names."""
+        """The labelled objects that are visible in renders at any time, ordered by name."""
         category = {one.name: self._category(one) for one in self.file.objects}
         root_of = {one.name: self._root(one, category) for one in self.file.objects}
         members: dict[str, list[str]] = {}
@@ -115,7 +115,7 @@ class BlendScenery(Sendable):
         return None
 
     def _root(self, one: SceneObject, category: Mapping[str, str | None]) -> SceneObject | None:
-        """The object that one is a part of: the farthest of its parents that is labelled alike, with nothing else between."""
+        """The object that `one` is a part of: its farthest parent with the same label, without other labels in between."""
         root = None
         for member in (one, *self.file.ancestors(one)):
             own = category[member.name]
@@ -127,7 +127,7 @@ class BlendScenery(Sendable):
 
     @cached_property
     def groups(self) -> Mapping[str, tuple[tuple[str, ...], ...]]:
-        """Of each group of variants its members, by name: an object and what is parented to it."""
+        """The members of each group of variants, by name: an object and its children."""
         found: dict[str, tuple[tuple[str, ...], ...]] = {}
         for name, entry in self.entry.variants.items():
             roots = [one for one in self.file.objects if fnmatchcase(one.name, entry.one_of)]
@@ -173,7 +173,7 @@ class BlendScenery(Sendable):
 
     @cached_property
     def world_from_file(self) -> Matrix4:
-        """Rigid: the spot where the targets stand is the world's origin."""
+        """The rigid motion that moves the targets' spot to the world's origin."""
         return _rows(_inverse(np.eye(4) if self.entry.at is None else self.file.by_name[self.entry.at].file_from_object))
 
     def pieces(self, model: str, pose: str | None, category_id: Naming) -> tuple[SceneryPiece, ...]:
@@ -182,7 +182,7 @@ class BlendScenery(Sendable):
 
     @cached_property
     def _pieces(self) -> Callable[[frozenset[str], Naming], tuple[SceneryPiece, ...]]:
-        """By what is hidden; the last are kept, because many shots share one."""
+        """The pieces for a set of hidden objects; the last results are cached, because many shots share one."""
 
         @lru_cache(maxsize=16)
         def pieces(hidden: frozenset[str], category_id: Naming) -> tuple[SceneryPiece, ...]:
@@ -198,7 +198,7 @@ class BlendScenery(Sendable):
         return pieces
 
     def shows(self, spec: ModelSpec, frame: int) -> bool:
-        """Return whether there is anything of a model that is taken of the file, at one of the frames; True for any other."""
+        """Return whether a model from the file is visible at one of the frames; True for other models."""
         if spec.parts is None:
             return True
         showing = self.file.showing[frame]
@@ -217,7 +217,7 @@ class BlendScenery(Sendable):
         return thing.model_copy(update={"motion": Motion.still(_rows(moved), step)})
 
     def steps(self, spec: ModelSpec) -> tuple[TimeStep, ...]:
-        """The frames at which a model is shown that is taken of the file; none for any other."""
+        """The frames at which a model from the file is visible; empty for other models."""
         if spec.parts is None:
             return ()
         return tuple(self._step(spec.parts, frame) for frame in self.frames if self.shows(spec, frame))
@@ -270,7 +270,7 @@ class BlendScenery(Sendable):
         )
 
     def check(self) -> None:
-        """Raise RecipeError for names and patterns of the recipe that fit nothing in the file."""
+        """Raise RecipeError for names and patterns of the recipe that match nothing in the file."""
         for i, rule in enumerate(self.entry.labels):
             if not any(_fits(rule, one) for one in self.file.objects):
                 kind, known = self._known(rule)
@@ -322,7 +322,7 @@ def _rows(matrix: Float) -> Matrix4:
 
 
 def _inverse(matrix: Float) -> Float:
-    """Of a rigid motion."""
+    """The inverse of a rigid motion."""
     inverse = np.eye(4)
     inverse[:3, :3] = matrix[:3, :3].T
     inverse[:3, 3] = -transform(matrix[:3, :3].T, matrix[:3, 3])

@@ -1,7 +1,7 @@
 """A recipe's scene made concrete: light, ground, materials and finish of a shot, finish and camera of a frame.
 
-Every distribution draws from a generator of its own, named by its field, and by the model and the pose as far as it is drawn
-for them: one more field, model or pose changes nobody else's draw.
+Every distribution has its own generator, seeded by its field, and by the model and the pose if it is drawn for these: another
+field, model or pose changes no other draw.
 """
 
 from __future__ import annotations
@@ -48,20 +48,20 @@ from viewsphere.recipe.world.light import DaylightSky, HdriSky, NightEntry, Nigh
 from viewsphere.recipe.world.surface import GroundEntry, MaterialEntry
 
 PARTS = tuple(Finish.model_fields)
-"""The parts of a finish, which have their names in a recipe's scene, too."""
+"""The parts of a finish, which have the same names in a recipe's scene."""
 
 WEATHER = frozenset({"rain", "snow", "wet"})
 """Fields of a scene whose drops, flakes and puddles have random places."""
 
 INDOOR_STOPS = 3.5
-"""The exposure at which a room by day is as bright as a street."""
+"""The exposure that makes a room by day as bright as a street."""
 
 
 @dataclass(frozen=True, eq=False)
 class Scenes:
-    """The scenes of a recipe. `model` is a model's key, `pose` a pose's name, or, for what all frames of a sequence share, the
-    name of the pose whenever it is taken. By the name of a `variation` differ the noise, and the draws of the fields of the
-    scene that are `drawn_alone` for it.
+    """The scenes of a recipe. `model` is a model's key, `pose` a pose's name; for values that all frames of a sequence share,
+    it is the pose's name without its time. The name of a `variation` seeds the noise, and the draws of the scene's fields in
+    `drawn_alone`.
     """
 
     recipe: Recipe
@@ -76,7 +76,7 @@ class Scenes:
 
     @cached_property
     def is_target_moved(self) -> bool:
-        """Return whether poses need to know what they look at, because it is moved."""
+        """Return whether jitter needs the poses' target, because it moves the target."""
         return self.recipe.scene.jitter.target != JitterEntry().target
 
     @cached_property
@@ -92,11 +92,11 @@ class Scenes:
         return self._scene(draw_names(self.recipe.scene.draw, model, pose), self._names_of_finish(model, None, pose))
 
     def finish(self, model: str, pose: str, place: str) -> Finish:
-        """The finish of one frame; `place` is the name of its pose whenever it is taken."""
+        """The finish of one frame; `place` is the name of its pose without its time."""
         return self._finish(self._names_of_finish(model, pose, place), (model, pose))
 
     def repaints(self, spec: ModelSpec, model: str, pose: str) -> tuple[Repaint, ...]:
-        """The changes to a target's materials, in a shot that is about `model`: a model looks alike beside any other."""
+        """The changes to a target's materials in a shot of `model`; a model looks the same beside any other model."""
         entry = self.recipe.scene
         each = entry.draw in ("per_frame", "per_sequence")
         names = (spec.key, model, pose) if each else draw_names(entry.draw, spec.key, None)
@@ -119,7 +119,7 @@ class Scenes:
         return drawn(entry, self._rng_of(draw_names(entry.draw, model, name)), ("jitter",))
 
     def jittered(self, pose: Viewpoint, model: str, name: str) -> Viewpoint:
-        """The pose moved at random; it keeps its index. One without a target of its own keeps to the models' centre."""
+        """The pose moved at random; it keeps its index. Without its own target, a pose keeps to the models' centre."""
         by = self.jitter(model, name)
         azimuth = pose.azimuth_deg + by.azimuth
         elevation = min(max(pose.elevation_deg + by.elevation, -90.0), 90.0)
@@ -142,7 +142,7 @@ class Scenes:
         return lambda path: (alone if path[0] in seeds else shared)(path)
 
     def _alone(self, names: Names) -> Names:
-        """The names that draws of this variation alone are keyed by."""
+        """The names that seed the draws of this variation alone."""
         return (*names, "variation", self.variation)
 
     def _names_of_finish(self, model: str, pose: str | None, place: str) -> tuple[Names, ...]:
@@ -171,7 +171,7 @@ class Scenes:
 
     @cached_property
     def _scene(self) -> Callable[[Names, tuple[Names, ...]], Scene]:
-        """Scenes by what they are drawn for; the last are kept, because many shots share one."""
+        """The scene for the names of its draws; the last results are cached, because many shots share one."""
 
         @lru_cache(maxsize=64)
         def scene(names: Names, names_of_finish: tuple[Names, ...]) -> Scene:
@@ -191,7 +191,7 @@ class Scenes:
         return scene
 
     def _weather_seed(self, names: Names, use: str) -> int:
-        """The seed of what falls or lies on the ground: of a variation alone where that has weather of its own."""
+        """The seed of drops, flakes or puddles: separate for a variation with its own weather."""
         of = self._alone(names) if self.drawn_alone & WEATHER else names
         return int(share(self.recipe.seed, "weather", use, *of) * 2**32)
 
@@ -216,7 +216,7 @@ class Scenes:
         return ground if entry.color or not entry.image else ground.model_copy(update={"color": WHITE})
 
     def _file(self, kind: Kind, path: str, field: tuple[str, ...], names: Names) -> str:
-        """The file that a path of the recipe means, drawn where that is a folder."""
+        """The file for a path of the recipe; from a folder, one is drawn."""
         files = self.pictures[kind, path]
         if len(files) == 1:
             return files[0]
@@ -232,7 +232,7 @@ class Scenes:
 
     @cached_property
     def _part(self) -> Callable[[str, Names], Any]:
-        """One part of a finish by what it is drawn for; the last are kept."""
+        """One part of a finish, for the names of its draws; the last results are cached."""
 
         @lru_cache(maxsize=256)
         def part(field: str, names: Names) -> Frozen:
@@ -255,7 +255,7 @@ class Scenes:
 
 
 def _substance(name: Any, size: int, rng_of: RngOf, field: tuple[str, ...]) -> ProceduralMaterial:
-    """A piece of a material; what else is drawn of it follows from the seed."""
+    """A piece of a material; its other random values follow from the seed."""
     return ProceduralMaterial(name=name, seed=int(rng_of((*field, "seed")).integers(2**32)), size=size)
 
 
@@ -269,7 +269,7 @@ def _sun(entry: Any, sky: AnySky) -> Sun | None:
 
 
 def _night(entry: NightEntry) -> Sky:
-    """A sky that the moon and the lights of towns light."""
+    """A sky lit by the moon and the lights of towns."""
     dark, glow = 0.05 + 0.5 * entry.moon, entry.glow
     return Sky(
         zenith=(0.1 * dark + 0.1 * glow, 0.13 * dark + 0.1 * glow, 0.24 * dark + 0.1 * glow),
@@ -285,7 +285,7 @@ def _moon(entry: NightEntry, sun: object) -> Sun | None:
 
 
 def check_night(recipe: Recipe) -> None:
-    """Raise RecipeError for a sky of night above which the sun stands."""
+    """Raise RecipeError for a night sky with the sun above the horizon."""
     scene = recipe.scene
     if any(isinstance(sky, NightSky) for sky in alternatives(scene.sky)):
         for sun in alternatives(scene.sun):
@@ -297,7 +297,7 @@ def check_night(recipe: Recipe) -> None:
 
 
 def _angles(entry: SunEntry) -> tuple[float, float] | None:
-    """Azimuth, as for cameras, and elevation of a sun that is given by date, time and place. North is +Y."""
+    """Azimuth, as for cameras, and elevation of a sun given by date, time and place. North is +Y."""
     if entry.date is None or entry.time is None or entry.latitude is None or entry.longitude is None:
         return None
     compass, elevation = sun_position(entry.date, entry.time, entry.latitude, entry.longitude)
@@ -305,7 +305,7 @@ def _angles(entry: SunEntry) -> tuple[float, float] | None:
 
 
 def is_night(entry: object) -> bool:
-    """Return whether a sun that is given by date, time and place, none of them drawn, is below the horizon."""
+    """Return whether a sun given by a fixed date, time and place is below the horizon."""
     if not isinstance(entry, SunEntry) or is_random((entry.date, entry.time, entry.latitude, entry.longitude)):
         return False
     angles = _angles(entry)

@@ -1,4 +1,4 @@
-"""The files and folders that a folder or a pattern of a recipe's `source` walks, which have a limit."""
+"""The files and folders below a folder or pattern of a recipe's `source`, up to a limit."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def below(folder: Path, where: str) -> list[Path]:
 
 
 def matching(folder: Path, pattern: str, where: str) -> list[Path]:
-    """Everything that a pattern means, from a folder on; raises RecipeError where the pattern walks more than the limit."""
+    """Everything that a pattern matches, starting from a folder; raises RecipeError beyond the limit of entries."""
     parts = PurePath(pattern).parts
     first = next(i for i, part in enumerate(parts) if has_magic(part))
     _check(folder.joinpath(*parts[:first]), None if "**" in parts else len(parts) - first, where)

@@ -1,4 +1,4 @@
-"""The picture files that a recipe's scene names: found when it is planned, looked at before it is rendered."""
+"""The picture files of a recipe's scene: found during planning, checked before rendering."""
 
 from __future__ import annotations
 
@@ -28,7 +28,9 @@ if TYPE_CHECKING:
 IMAGE_SUFFIXES = (".bmp", ".jpeg", ".jpg", ".png", ".tif", ".tiff", ".webp")
 
 Kind = Literal["image", "images", "textures", "hdri"]
-"""A picture, a folder of pictures, one whose pictures all lie in it, or a picture or folder of the whole sphere."""
+"""A picture, a folder of pictures, a folder that directly contains all its pictures, or a picture or folder of the whole
+sphere.
+"""
 
 Pictures = Mapping[tuple[Kind, str], tuple[str, ...]]
 """Absolute paths of the files that a path of the recipe stands for, sorted."""
@@ -47,14 +49,14 @@ _TAIL = 64  # bytes in which an end is searched: some programs write a little be
 
 
 def scene_pictures(recipe: Recipe) -> Pictures:
-    """The files of every path in the recipe's scene; raises RecipeError for those that are not there."""
+    """The files of every path in the recipe's scene; raises RecipeError for missing ones."""
     found = chain.from_iterable(map(_paths, recipe.conditions.values()))
     return {(kind, path): _files(recipe, field, kind, path) for field, kind, path in found}
 
 
 def check_pictures(recipe: Recipe, pictures: Pictures) -> None:
-    """See that the files of a scene are pictures, as far as their first and last bytes tell; raises RecipeError for the first
-    that is not.
+    """Check by their first and last bytes that the files of a scene are pictures; raises RecipeError for the first that is
+    not.
     """
     for field, kind, path in chain.from_iterable(map(_paths, recipe.conditions.values())):
         for file in pictures[kind, path]:
@@ -97,7 +99,7 @@ def _files(recipe: Recipe, field: str, kind: Kind, written: str) -> tuple[str, .
 
 
 def _check_folder(folder: Path, found: tuple[str, ...], field: str) -> None:
-    """Raise RecipeError for a folder that is none, and for a link in it to a file elsewhere."""
+    """Raise RecipeError if a path is not a folder, or if a link in the folder leads to a file elsewhere."""
     if not folder.is_dir():
         problem = "is none" if folder.exists() else "does not exist"
         raise RecipeError(f"{field}: expected a folder with images; {folder} {problem}")
@@ -121,7 +123,7 @@ def files_in(folder: Path, suffixes: tuple[str, ...] = IMAGE_SUFFIXES) -> tuple[
 def proportions(path: str, field: str = "scene.planes") -> float:
     """Width over height of a picture as it is shown; raises RecipeError about the recipe's field when it cannot be read.
 
-    A file that ends early is told by its end, where its kind has one, and is refused when it cannot be decoded.
+    A truncated file is detected by its last bytes, if its kind has an end marker; a file that cannot be decoded is refused.
     """
     from PIL import Image, UnidentifiedImageError
 
@@ -155,7 +157,7 @@ def _too_large(field: str, found: str, path: str) -> RecipeError:
 
 
 def _is_sideways(image: Image) -> bool:
-    """Return whether EXIF says that the camera was turned; what cannot be read says nothing."""
+    """Return whether EXIF data record a turned camera; False for unreadable data."""
     try:
         return image.getexif().get(0x0112, 1) >= 5
     except Exception:  # the parser of a damaged block raises whatever it meets
@@ -163,7 +165,7 @@ def _is_sideways(image: Image) -> bool:
 
 
 def _ends_well(path: str, kind: str) -> bool:
-    """Return whether a file's last bytes are those that end its kind; True where the kind has no such."""
+    """Return whether a file ends with its kind's end marker; True for kinds without one."""
     if kind not in _ENDS:
         return True
     with open_file(Path(path), "MAX_PICTURE_BYTES") as file:

@@ -29,16 +29,16 @@ if TYPE_CHECKING:
 Float = NDArray[np.float64]
 
 WIDTH = 3.0
-"""Metres that a lane is wide which does not say it."""
+"""Default width of a lane, metres."""
 
 FLAT = 0.005
-"""Metres by which the points of a surface may lie below its highest one."""
+"""Largest distance of a surface's points below its highest one, metres."""
 
 LEAST = 0.5
-"""Share of what a mesh covers, as seen from above, that is level and on top where it is a surface."""
+"""Least share of a mesh's area, seen from above, that must be level and on top for the mesh to count as a surface."""
 
 NEAR = 0.02
-"""Metres above or below a floor at which models still stand on it."""
+"""Largest height above or below a floor at which models still stand on it, metres."""
 
 
 @dataclass(frozen=True)
@@ -85,12 +85,12 @@ class FileOffers:
 
     @property
     def lanes(self) -> tuple[Lane, ...]:
-        """Its lanes; RecipeError where one cannot be."""
+        """Its lanes; raises RecipeError for an invalid one."""
         return self._sound(LANE, self.all_lanes)
 
     @property
     def surfaces(self) -> tuple[Surface, ...]:
-        """Its surfaces; RecipeError where one cannot be."""
+        """Its surfaces; raises RecipeError for an invalid one."""
         return self._sound(SURFACE, self.all_surfaces)
 
     def _sound(self, kind: str, found: tuple[Any, ...]) -> tuple[Any, ...]:
@@ -111,7 +111,7 @@ def offers_of(spec: ModelSpec) -> FileOffers:
 
 @lru_cache(maxsize=16)
 def _offers_of(text: str, state: tuple[int, int]) -> FileOffers:
-    """The offers by the specification as JSON, and by what changes with the file."""
+    """The offers for a specification as JSON and the state of its file."""
     from viewsphere.assets.cache import kept, load  # which loads readers of models
 
     spec = ModelSpec.model_validate_json(text)
@@ -155,7 +155,9 @@ def _lane(mark: Annotation, facts: FileFacts) -> dict[str, Any]:
 
 
 def _level(mark: Annotation, points: Float, is_said: bool) -> Iterator[dict[str, Any]]:
-    """The rectangle of a floor or of a surface; nothing of what is higher than wide, as a floor lamp is, by its name alone."""
+    """The rectangle of a floor or of a surface. Objects marked only by their name give nothing if they are higher than wide,
+    such as a floor lamp.
+    """
     top, low = float(points[:, 2].max()), float(points[:, 2].min())
     whole, face = _around(points), points
     if mark.kind == FLOOR:
@@ -181,8 +183,8 @@ def _level(mark: Annotation, points: Float, is_said: bool) -> Iterator[dict[str,
 
 
 def _around(points: Float) -> tuple[tuple[float, float], float, tuple[float, float]]:
-    """The middle, the turn in degrees, of -45 to 45, and the size of the rectangle around points as seen from above, made
-    smaller until it lies within their hull, as the square in a disc does.
+    """The middle, the turn in degrees, -45 to 45, and the size of the rectangle around points seen from above, shrunk until it
+    is inside their hull, such as the square in a disc.
     """
     hull = convex_hull(points[:, :2])
     corners = smallest_rectangle(hull)
@@ -197,7 +199,7 @@ def _around(points: Float) -> tuple[tuple[float, float], float, tuple[float, flo
 
 
 def _share_within(hull: Float, middle: Float, corners: Float) -> float:
-    """The factor, 1 at most, by which a rectangle's corners about its middle lie within a convex hull."""
+    """The factor, at most 1, that shrinks a rectangle about its middle until it is inside a convex hull."""
     sides = np.roll(hull, -1, axis=0) - hull
     outward = np.stack([sides[:, 1], -sides[:, 0]], axis=1)
     room = ((hull - middle) * outward).sum(axis=1)
@@ -206,7 +208,7 @@ def _share_within(hull: Float, middle: Float, corners: Float) -> float:
 
 
 def _offers(file: str, found: list[dict[str, Any]]) -> FileOffers:
-    """The offers of what a file says; of several floors the largest."""
+    """The offers from a file's declarations; of several floors, the largest is used."""
     known = (FLOOR, LANE, SURFACE, INDOORS)
     for one in found:
         if one["kind"] not in known or (one["problem"] and one["kind"] in (FLOOR, INDOORS)):
@@ -226,7 +228,7 @@ def _offers(file: str, found: list[dict[str, Any]]) -> FileOffers:
 
 
 def _named(found: list[dict[str, Any]]) -> Iterator[tuple[str, dict[str, Any]]]:
-    """Each with a name of its own: table, table_2, ..."""
+    """The declarations with unique names: table, table_2, ..."""
     taken = set[str]()
     for one in found:
         own = own_name(one["name"])

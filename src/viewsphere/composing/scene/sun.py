@@ -12,8 +12,8 @@ _DAY_0 = 1721424.5
 def sun_position(day: str, hours: float, latitude: float, longitude: float) -> tuple[float, float]:
     """Compass azimuth (clockwise from north) and elevation of the sun, degrees, as seen through the air.
 
-    `day`: its date; `hours`: of that day in UTC, below 0 or above 24 for another; degrees north and east. Good to about
-    0.02 degrees from 1800 to 2100 (https://gml.noaa.gov/grad/solcalc/calcdetails.html).
+    `day`: its date; `hours`: UTC hours of that day, below 0 or above 24 for another day; degrees north and east. Accurate to
+    about 0.02 degrees from 1800 to 2100 (https://gml.noaa.gov/grad/solcalc/calcdetails.html).
     """
     century = (date.fromisoformat(day).toordinal() + _DAY_0 + hours / 24 - 2451545) / 36525
     declination, equation = _apparent_sun(century)

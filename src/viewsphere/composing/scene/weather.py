@@ -1,4 +1,4 @@
-"""A scene under the weather of its recipe: its light as it comes through, and what lies in the air and falls."""
+"""A scene under the weather of its recipe: changed light, fog, rain, snow and water."""
 
 from __future__ import annotations
 
@@ -21,13 +21,13 @@ from viewsphere.rendering.weather.conditions import clouded, floor_light, in_fog
 from viewsphere.rendering.weather.precipitation import extinction
 
 SOAKING = 25.0
-"""Millimetres of rain an hour from which on nothing becomes wetter."""
+"""Millimetres of rain an hour above which surfaces do not become wetter."""
 
 SeedOf = Callable[[str], int]
 
 
 def weathered(scene: Scene, entry: SceneEntry, rng_of: RngOf, seed_of: SeedOf) -> Scene:
-    """The scene with the weather of its entry, drawn. `seed_of`: a number for a purpose, on which nothing else depends."""
+    """The scene with the weather drawn from its entry. `seed_of` returns an independent seed for a purpose."""
     scene = scene.model_copy(update=_lamps(entry, rng_of))
     fog, rain, snow, wet = (drawn(getattr(entry, name), rng_of, (seed_name(name),)) for name in ("fog", "rain", "snow", "wet"))
     falling = [one for one in (rain, snow) if isinstance(one, (RainEntry, SnowEntry))]
@@ -51,13 +51,13 @@ def weathered(scene: Scene, entry: SceneEntry, rng_of: RngOf, seed_of: SeedOf) -
 
 
 def through_windows(scene: Scene, outdoors: Scene) -> Scene:
-    """The scene of a room: of the weather outdoors light comes in, and fog is seen through the windows."""
+    """The scene of a room: outdoor weather changes the incoming light, and its fog is visible through the windows."""
     kept = {name: getattr(outdoors, name) for name in ("sun", "sky", "lights", "lamps")}
     return scene.model_copy(update={**kept, "fog_outdoors": outdoors.fog})
 
 
 def _lamps(entry: SceneEntry, rng_of: RngOf) -> dict[str, Lamps]:
-    """Lit lamps, in a scene's field: by default at night."""
+    """The scene's field for lit lamps: by default, lamps are lit at night."""
     lamps = drawn(entry.lamps, rng_of, ("lamps",))
     if isinstance(lamps, LampsEntry):
         return {"lamps": concrete(lamps)}
@@ -65,7 +65,7 @@ def _lamps(entry: SceneEntry, rng_of: RngOf) -> dict[str, Lamps]:
 
 
 def _hazy(fog: Fog | None, falling: list[Rain | Snow], light: np.ndarray[Any, Any]) -> Fog:
-    """The air between drops that are too far away to be told apart, with that of fog."""
+    """The fog, with the haze of drops that are too far away to be distinguished."""
     more = sum(map(extinction, falling))
     if fog is None:
         return Fog(visibility=CONTRAST / more, color=_triple(light))
@@ -75,7 +75,7 @@ def _hazy(fog: Fog | None, falling: list[Rain | Snow], light: np.ndarray[Any, An
 
 
 def _wet(scene: Scene, entry: object, rain: object, seed_of: SeedOf) -> dict[str, Any]:
-    """Water on the ground, in a scene's field: as it is said, else what rain brings."""
+    """The scene's field for water on the ground: from the entry, else from the rain."""
     if isinstance(entry, WetEntry):
         return _soaked(scene, concrete(entry, seed=seed_of("puddles")))
     if entry == "off" or not isinstance(rain, RainEntry):
@@ -85,7 +85,7 @@ def _wet(scene: Scene, entry: object, rain: object, seed_of: SeedOf) -> dict[str
 
 
 def _soaked(scene: Scene, wet: Wet) -> dict[str, Any]:
-    """Water, and the ground plane under it, which it makes darker and smoother, in a scene's fields."""
+    """The scene's fields for water, and for the ground plane, which water makes darker and smoother."""
     ground = scene.ground
     if ground is None or ground.catcher:
         return {"wet": wet}
@@ -103,6 +103,6 @@ def _even(lights: tuple[Any, ...]) -> np.ndarray[Any, Any]:
 
 
 def _triple(light: np.ndarray[Any, Any]) -> tuple[float, float, float]:
-    """Light as numbers of a record, which are the same on all processors."""
+    """Light as rounded numbers for records, equal on all processors."""
     r, g, b = (float(f"{value:.6g}") for value in np.maximum(light, 0).tolist())
     return r, g, b

@@ -1,6 +1,6 @@
 """Motions of the rig over time: one file a kind, named as in recipes; none imports another.
 
-A trajectory is asked once for all instants of a sequence, so that no cut of the sequence changes it.
+A trajectory computes all instants of a sequence at once, so that the division into shots does not change it.
 """
 
 from __future__ import annotations
@@ -36,12 +36,12 @@ __all__ = [
 
 
 def is_still(viewpoints: Viewpoints) -> bool:
-    """Return whether the viewpoints are places at which a camera stays, each for a sequence; otherwise they are one motion."""
+    """Return whether each viewpoint is a still camera for a sequence; otherwise all are one motion."""
     return isinstance(viewpoints, (Grid, Jitter, Sphere, Normal))
 
 
 def trajectory(viewpoints: Viewpoints, folder: Path) -> Trajectory:
-    """The motion that a recipe's viewpoints mean, shaken where they say so; paths start from `folder`, the recipe's.
+    """The motion of a recipe's viewpoints, with shake if requested; paths are relative to `folder`, the recipe's.
 
     Raises RecipeError for a file that cannot be read, ValueError for viewpoints that stay still.
     """
@@ -53,13 +53,13 @@ def trajectory(viewpoints: Viewpoints, folder: Path) -> Trajectory:
 
 
 def standing(viewpoint: Viewpoint, focus: Vector) -> RigPose:
-    """The rig at a viewpoint at which it stays, to be shaken; it looks at `focus` unless the viewpoint has its own target."""
+    """The rig at a still viewpoint, before shaking; it looks at `focus` unless the viewpoint has its own target."""
     now = looking(viewpoint, focus, index=0)
     return RigPose(np.array(now.world_from_rig), now.focus)
 
 
 def instant(pose: RigPose, index: int, seconds: float, view: int, bins: float, **more: Any) -> Instant:
-    """The instant of a sequence at which the rig is there; `view` numbers its viewpoint, whose categories are `bins` degrees
+    """The instant of a sequence with this rig pose; `view` is the number of its viewpoint, whose categories are `bins` degrees
     wide. `more` are further fields of the instant.
     """
     a, b, c = ((x, y, z, w) for x, y, z, w in pose.world_from_rig[:3].tolist())

@@ -38,14 +38,16 @@ class DrivePath(Moving):
 
 @dataclass(frozen=True, eq=False)
 class Drive:
-    """At an even speed, above the lane's middle or beside it."""
+    """Motion at constant speed, above the lane's middle or to its side."""
 
     entry: DrivePath
     digest: str = ""
     intrinsics: Intrinsics | None = None
 
     def poses(self, times: Float, world: World) -> tuple[RigPose, ...]:
-        """As `Trajectory.poses`; RecipeError for a place without lanes, or without this one, and a start beyond its end."""
+        """See `Trajectory.poses`; raises RecipeError for a place without lanes, an unknown lane, or a start beyond the lane's
+        end.
+        """
         entry, curve = self.entry, self._lane(world)
         if entry.offset >= curve.length:
             raise RecipeError(

@@ -1,4 +1,4 @@
-"""A trajectory from a file: positions and lenses change evenly between two poses, rotations by slerp."""
+"""A trajectory from a file, interpolated between poses: positions and lenses linearly, rotations by slerp."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from viewsphere.recipe.cameras.viewpoints import PoseList
 
 Float = NDArray[np.float64]
 Between = tuple[int, float]
-"""A time between two poses of a file: the number of the first, and the share of the way to the next."""
+"""A time between two poses of a file: the number of the first, and the position towards the next, 0 to 1."""
 
 LATE = 1e-6
 """Seconds by which a sequence may be longer than its file."""
@@ -34,7 +34,9 @@ LENS = ("fx", "fy", "cx", "cy")
 
 @dataclass(frozen=True, eq=False)
 class FileTrajectory:
-    """The poses of a file, at its time stamps from the first one on; without stamps one at each frame of the recipe's rate."""
+    """The poses of a file, at its time stamps relative to the first one; without stamps, one pose for each frame of the
+    recipe's rate.
+    """
 
     entry: PoseList
     file: PoseFile
@@ -50,7 +52,7 @@ class FileTrajectory:
         return self.file.lenses[0] if self.file.lenses else self.file.intrinsics
 
     def poses(self, times: Float, world: World) -> tuple[RigPose, ...]:
-        """As `Trajectory.poses`; RecipeError for stamps that do not ascend, and a file that is shorter than the sequence."""
+        """See `Trajectory.poses`; raises RecipeError for stamps that do not ascend, or a file shorter than the sequence."""
         stamps = self._stamps(world.fps)
         if times[-1] > stamps[-1] + LATE:
             raise RecipeError(
@@ -75,7 +77,7 @@ class FileTrajectory:
 
     @cached_property
     def _motions(self) -> tuple[Float, tuple[tuple[float, ...], ...]]:
-        """Centres (N, 3) and quaternions of all cameras in our world."""
+        """Centres (N, 3) and quaternions of all cameras, in the recipe's world."""
         turn = world_turn(self.entry, self.file)
         whole = [placed(one, turn, self.entry) for one in self.file.entries if isinstance(one, Extrinsics)]
         return np.array([pose[:3, 3] for pose in whole]), tuple(quaternion_from_matrix(pose[:3, :3]) for pose in whole)
@@ -102,14 +104,14 @@ class FileTrajectory:
 
     @cached_property
     def _orbits(self) -> Float:
-        """Azimuth, elevation, distance and tilt (N, 4) of all orbits; angles go the shorter way to the next."""
+        """Azimuth, elevation, distance and tilt (N, 4) of all orbits; angles take the shorter way to the next orbit."""
         found = np.array([tuple(one) for one in self.file.entries], np.float64)
         found[:, (0, 3)] = np.unwrap(found[:, (0, 3)], axis=0, period=360.0)
         return found
 
 
 def _between(stamps: Float, seconds: float) -> Between:
-    """A time's place among stamps that ascend; after the last one, the last."""
+    """A time's place among ascending stamps; after the last stamp, the last place."""
     i = int(np.searchsorted(stamps, seconds, side="right")) - 1
     if i + 1 >= len(stamps):
         return len(stamps) - 1, 0.0
@@ -123,7 +125,7 @@ def _mixed(values: Float, place: Between) -> Float:
 
 
 def trajectory(entry: PoseList, folder: Path) -> FileTrajectory:
-    """The motion that an entry of a recipe means; of a 3D file's camera at all of its frames, unless the entry names some."""
+    """The motion that an entry of a recipe means; for a 3D file's camera, at all of its frames unless the entry names some."""
     whole = entry if entry.frames is not None or not _is_3d(entry) else entry.model_copy(update={"frames": "all"})
     found = pose_file(folder / Path(entry.path).expanduser(), whole, zooms=True)
     if len({(lens.width, lens.height, lens.lens.parameters) for lens in found.lenses}) > 1:

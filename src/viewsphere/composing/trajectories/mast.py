@@ -22,7 +22,7 @@ Float = NDArray[np.float64]
 
 
 class MastPost(Moving):
-    """A camera on a mast, or straight overhead: it stays, and may turn or go with a thing."""
+    """A camera on a mast, or straight overhead: it stays in place, and may turn or move with a thing."""
 
     kind: Literal["mast"] = Field(description="a fixed place, or straight overhead")
     position: Place | None = Field(default=None, description="[x, y, z] in metres")
@@ -47,14 +47,14 @@ class MastPost(Moving):
 
 @dataclass(frozen=True, eq=False)
 class Mast:
-    """It stands, and turns with what it looks at; overhead it goes with that."""
+    """A rig that stays in place and turns with its target; overhead, it moves with the target."""
 
     entry: MastPost
     digest: str = ""
     intrinsics: Intrinsics | None = None
 
     def poses(self, times: Float, world: World) -> tuple[RigPose, ...]:
-        """As `Trajectory.poses`."""
+        """See `Trajectory.poses`."""
         entry = self.entry
         focus = focuses(entry, entry.look, times, world)
         assert focus is not None

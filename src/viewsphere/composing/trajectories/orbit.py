@@ -1,4 +1,4 @@
-"""A circle, or a part of one, around what the rig looks at."""
+"""A circle, or a part of one, around the rig's target."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ Float = NDArray[np.float64]
 
 
 class OrbitPath(Moving):
-    """A circle, or a part of one, around what the camera looks at."""
+    """A circle, or a part of one, around the camera's target."""
 
     kind: Literal["orbit"] = Field(description="a circle around its target")
     look: Look = Field(default="center", description=f"the centre of its circle: {LOOK}; not ahead")
@@ -74,14 +74,14 @@ class OrbitPath(Moving):
 
 @dataclass(frozen=True, eq=False)
 class Orbit:
-    """Angles and distance change evenly with time."""
+    """An orbit whose angles and distance change linearly with time."""
 
     entry: OrbitPath
     digest: str = ""
     intrinsics: Intrinsics | None = None
 
     def poses(self, times: Float, world: World) -> tuple[RigPose, ...]:
-        """As `Trajectory.poses`."""
+        """See `Trajectory.poses`."""
         entry = self.entry
         elevation, distance, tilt = (_drifted(ends(v), times) for v in (entry.elevation, entry.distance, entry.tilt))
         focus = focuses(entry, entry.look, times, world)
@@ -100,7 +100,7 @@ class Orbit:
 
 
 def _drifted(drift: tuple[float, float], times: Float) -> list[float]:
-    """From the first number at the first instant to the second one at the last, which is met exactly."""
+    """Numbers from the first one at the first instant to the second one at the last instant, which is reached exactly."""
     first, last = drift
     if first == last or len(times) == 1:
         return [first] * len(times)

@@ -70,7 +70,7 @@ class SplinePath(Moving):
 
 @dataclass(frozen=True, eq=False)
 class Spline:
-    """Along the curve at an even speed, or, between two points with times, at the speed that they ask for."""
+    """Motion along the curve at constant speed or, between two points with times, at the speed that these determine."""
 
     entry: SplinePath
     digest: str = ""
@@ -82,7 +82,7 @@ class Spline:
         return spline(self.entry.points, self.entry.closed)
 
     def poses(self, times: Float, world: World) -> tuple[RigPose, ...]:
-        """As `Trajectory.poses`."""
+        """See `Trajectory.poses`."""
         lengths = self._lengths(times)
         focus = focuses(self.entry, self.entry.look, times, world)
         return aimed(self.curve.at(lengths), self.curve.direction(lengths), focus, world)

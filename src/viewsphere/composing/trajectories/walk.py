@@ -76,8 +76,8 @@ class WalkPath(Moving):
 
 @dataclass(frozen=True)
 class Stretch:
-    """From a time (seconds) on, at a place, with a heading (radians, counter-clockwise from +Y) that changes by `rate` a
-    second.
+    """A stretch from a time (seconds) on: its start, with a heading (radians, counter-clockwise from +Y) that changes by `rate`
+    a second.
     """
 
     begin: float
@@ -87,7 +87,7 @@ class Stretch:
     rate: float
 
     def offset_at(self, seconds: float, speed: float) -> tuple[float, float, float]:
-        """Place and heading at a time: on a line, or on an arc of radius speed / rate."""
+        """Position and heading at a time: on a line, or on an arc of radius speed / rate."""
         passed = seconds - self.begin
         heading = self.heading + self.rate * passed
         if self.rate == 0:
@@ -100,14 +100,14 @@ class Stretch:
 
 @dataclass(frozen=True, eq=False)
 class Walk:
-    """Steps make the eyes go up and down, and half as often to both sides."""
+    """A walk whose steps move the eyes up and down, and at half the frequency to both sides."""
 
     entry: WalkPath
     digest: str = ""
     intrinsics: Intrinsics | None = None
 
     def poses(self, times: Float, world: World) -> tuple[RigPose, ...]:
-        """As `Trajectory.poses`."""
+        """See `Trajectory.poses`."""
         entry = self.entry
         if self._curve is None:
             places, ahead = self._freely(times)
@@ -126,7 +126,7 @@ class Walk:
         return None if self.entry.points is None else spline([(x, y, 0.0) for x, y in self.entry.points])
 
     def _freely(self, times: Float) -> tuple[Float, Float]:
-        """Places on the floor and directions (T, 3) from the start on, turn after turn."""
+        """Positions on the floor and directions (T, 3) from the start on, turn after turn."""
         stretches = tuple(self._stretches())
         begins = np.array([stretch.begin for stretch in stretches])
         places = np.maximum(np.searchsorted(begins, times, side="right") - 1, 0)
@@ -146,7 +146,7 @@ class Walk:
                 yield now
 
     def _bob(self, walked: Float) -> tuple[Float, Float]:
-        """Metres to the right, and up, after so many metres."""
+        """Offsets to the right and up, metres, after these walked metres."""
         strides = [2 * math.pi * metres / self.entry.stride for metres in walked.tolist()]
         sway = np.array([self.entry.bob / 2 * math.sin(phase) for phase in strides])
         return sway, np.array([self.entry.bob * math.sin(2 * phase) for phase in strides])

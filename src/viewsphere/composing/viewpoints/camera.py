@@ -1,4 +1,4 @@
-"""From a pose to its camera, and whether it can stand there."""
+"""The camera of a pose, and the check for cameras inside a model."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from viewsphere.model.scene import IDENTITY, Vector
 Float = NDArray[np.float64]
 
 LARGE = 10.0
-"""Metres: a model that reaches farther, and encloses its camera, is in millimetres more often than a building."""
+"""Metres: a model that reaches farther and encloses its camera is more often one in millimetres than a building."""
 
 
 def looking(viewpoint: Viewpoint, focus: Vector, **more: Any) -> Instant:
-    """The instant at which a camera stands at a viewpoint; it looks at `focus` unless the viewpoint has a target of its own."""
+    """The instant with the camera at a viewpoint; it looks at `focus` unless the viewpoint has its own target."""
     azimuth, elevation, tilt = np.radians([viewpoint.azimuth_deg, viewpoint.elevation_deg, viewpoint.tilt_deg])
     at = viewpoint.target or focus
     center = np.array(at) + orbit_center(azimuth, elevation, viewpoint.distance)

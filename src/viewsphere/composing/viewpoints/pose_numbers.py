@@ -1,7 +1,7 @@
-"""The data set's numbers of poses: a pose that was there keeps its number, new ones are counted on.
+"""The data set's numbers of poses: existing poses keep their numbers, new ones get the next numbers.
 
-A pose is known by a 64-bit digest of its name and of where its camera stands. Digests that follow from a part's recipe are
-not kept but computed when somebody appends: they would be more than all else that a plan says.
+A pose is identified by a 64-bit digest of its name and its camera's position. Digests that follow from a part's recipe are not
+stored, but computed when frames are appended: they would be larger than the rest of the plan.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ _TIME, _SEED = TypeAdapter(TimeEntry), TypeAdapter(Natural)
 
 
 def pose_names(views: Poses) -> Names:
-    """The digest of every pose; one of a camera that moves is known by its whole motion."""
+    """The digest of every pose; the pose of a moving camera is identified by its whole motion."""
     moving = isinstance(views, SequencePoses) and isinstance(views.base, TrajectoryPoses)
     motion = (views.viewpoints.model_dump_json(), views.digest) if moving else ()
     shared = ("shared",) if views.are_shared else ()
@@ -48,18 +48,18 @@ def pose_names(views: Poses) -> Names:
 
 
 def follows_from_recipe(views: Poses) -> bool:
-    """Return whether a recipe alone says which poses these are, without any file."""
+    """Return whether the recipe alone determines these poses, without any file."""
     plain = views.base if isinstance(views, SequencePoses) else views
     return not isinstance(plain, ListedPoses | TimedPoses) and not plain.digest
 
 
 def kept(names: Names) -> str:
-    """Digests as a part's `pose_names` keeps them."""
+    """Digests as stored in a part's `pose_names`."""
     return b64encode(names.tobytes()).decode()
 
 
 def names_of(there: PlanRecord) -> Names:
-    """The digest of every pose of a data set by its number; 0 for those of which nothing is known."""
+    """The digest of every pose of a data set by its number; 0 for unknown ones."""
     known = np.zeros(0, np.dtype("<u8"))
     for part in there.parts:
         if part.pose_names is not None:
@@ -71,7 +71,7 @@ def names_of(there: PlanRecord) -> Names:
 
 
 def numbered(there: PlanRecord, views: Poses) -> tuple[Sequence[int], Names]:
-    """The data set's number of every pose, new ones counted on; and the digests of the new ones."""
+    """The data set's number of every pose, with the next numbers for new ones; and the digests of the new ones."""
     if not there.poses:
         return range(len(views)), np.zeros(0, np.dtype("<u8")) if follows_from_recipe(views) else pose_names(views)
     wanted, known = pose_names(views), names_of(there)
@@ -89,7 +89,7 @@ def first_numbers(there: PlanRecord) -> Indices:
 
 
 def has_poses_of(there: PlanRecord, views: Poses) -> bool:
-    """Return whether the data set's poses are these, in this order, as is plain from its recipe."""
+    """Return whether the data set has these poses in this order, judging by its recipe alone."""
     brought = [part for part in there.parts if part.new_poses]
     if len(brought) != 1 or brought[0].pose_names is not None or not follows_from_recipe(views):
         return False
@@ -111,7 +111,7 @@ def as_ranges(numbers: Indices) -> Ranges:
 
 
 def _views(part: Part) -> Poses:
-    """The poses of a part's recipe, one from which they follow; raises StoreError where a stranger changed it."""
+    """The poses of a part, from its recipe; raises StoreError if the recipe was changed to an invalid one."""
     recipe: dict[str, Any] = part.recipe
     time = recipe.get("time")
     try:

@@ -32,7 +32,7 @@ Float = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Poses(Sequence[Viewpoint]):
-    """The poses of a recipe, in index order, made one by one when asked for: a million of them take no memory.
+    """The poses of a recipe, in index order, made one by one on access: a million of them take no memory.
 
     `counts` are the factors of their number, outermost loop first.
     """
@@ -42,21 +42,21 @@ class Poses(Sequence[Viewpoint]):
 
     @property
     def digest(self) -> str:
-        """SHA-256 of what the recipe does not say of the poses, as it stands in a file; empty if there is no such thing."""
+        """SHA-256 of the file of poses; empty without one."""
         return ""
 
     @property
     def intrinsics(self) -> Intrinsics | None:
-        """The lens that a file of poses names, the first one's where poses have lenses of their own."""
+        """The lens of the file of poses; the first pose's lens if poses have their own."""
         return None
 
     def lens(self, index: int) -> Intrinsics | None:
-        """The pose's own lens, None where all have one."""
+        """The pose's own lens, None if all share one."""
         return None
 
     @property
     def lowest_elevation(self) -> float:
-        """The lowest elevation there can be, degrees; where they are normal around one, that one."""
+        """The lowest possible elevation, degrees; for a normal distribution, its mean."""
         assert isinstance(self.viewpoints, Grid | Sphere | Normal | Jitter)
         elevation = self.viewpoints.elevation
         if isinstance(elevation, Range):
@@ -65,11 +65,11 @@ class Poses(Sequence[Viewpoint]):
 
     @property
     def are_known(self) -> bool:
-        """Return whether the recipe alone says where cameras stand."""
+        """Return whether the recipe alone determines the cameras' positions."""
         return not isinstance(getattr(self.viewpoints, "distance", None), Fill | FillBetween)
 
     def fill(self, index: int) -> float | None:
-        """The share of the picture that a model fills, from which the pose's distance follows; None where that is given."""
+        """The share of the picture that a model fills, from which the pose's distance follows; None if it is given."""
         return None
 
     def target(self, index: int) -> Vector | None:
@@ -87,7 +87,7 @@ class Poses(Sequence[Viewpoint]):
         """The pose's stable name: equal for the same pose wherever it stands in the list."""
 
     def place(self, index: int) -> str:
-        """The pose's name whenever it is taken: equal at all time steps of an animation."""
+        """The pose's name without its time: equal at all time steps of an animation."""
         return self.name(index)
 
     @abstractmethod
@@ -100,7 +100,7 @@ class Poses(Sequence[Viewpoint]):
         return getattr(self.viewpoints, "shared", False)
 
     def for_subject(self, subject: str) -> Poses:
-        """The poses that a subject is taken from: random ones are drawn for each, unless they are shared."""
+        """The poses of a subject: random ones are drawn for each subject, unless they are shared."""
         return self if self.are_shared else self.drawn_for(subject)
 
     def drawn_for(self, name: str) -> Poses:
@@ -142,33 +142,33 @@ class Poses(Sequence[Viewpoint]):
 
 @dataclass(frozen=True)
 class RepeatedPoses(Poses):
-    """Poses that are each taken several times; all but the times of a pose is the pose's."""
+    """Poses that are each used several times; all properties except the time come from the base pose."""
 
     base: Poses
 
     @abstractmethod
     def taken(self, index: int) -> int:
-        """The number, among the poses, of the one that is taken."""
+        """The number of the base pose."""
 
     def drawn_for(self, name: str) -> Self:
-        """The same poses as often, random ones drawn anew for this name."""
+        """The same repeated poses, random ones drawn anew for this name."""
         base = self.base.drawn_for(name)
         return self if base is self.base else replace(self, viewpoints=base.viewpoints, seed=base.seed, base=base)
 
     def target(self, index: int) -> Vector | None:
-        """The pose's."""
+        """The base pose's target."""
         return self.base.target(self.taken(index))
 
     def place(self, index: int) -> str:
-        """The pose's."""
+        """The base pose's name without its time."""
         return self.base.place(self.taken(index))
 
     def view(self, index: int) -> Orbit:
-        """The pose's."""
+        """The base pose's orbit."""
         return self.base.view(self.taken(index))
 
     def fill(self, index: int) -> float | None:
-        """The pose's."""
+        """The base pose's filled share."""
         return self.base.fill(self.taken(index))
 
     @property
@@ -177,17 +177,17 @@ class RepeatedPoses(Poses):
         return self.base.intrinsics
 
     def lens(self, index: int) -> Intrinsics | None:
-        """The pose's."""
+        """The base pose's own lens."""
         return self.base.lens(self.taken(index))
 
     @property
     def lowest_elevation(self) -> float:
-        """That of the poses."""
+        """The lowest elevation of the base poses."""
         return self.base.lowest_elevation
 
     @property
     def are_known(self) -> bool:
-        """Return whether the poses are."""
+        """Return whether the base poses are known."""
         return self.base.are_known
 
 
@@ -198,7 +198,7 @@ class GridPoses(Poses):
     viewpoints: Grid | Jitter
 
     def drawn_for(self, name: str) -> Poses:
-        """The same: nothing is random."""
+        """The same poses: nothing is random."""
         return self
 
     @property
@@ -212,7 +212,7 @@ class GridPoses(Poses):
         return "pose " + " ".join(repr(v + 0.0) for v in self.view(index)) + ("" if fill is None else f" fill {fill!r}")
 
     def view(self, index: int) -> Orbit:
-        """The values that this index stands for; distance 1 where that follows from a share to be filled."""
+        """The values at this index; distance 1 if the distance follows from a filled share."""
         tilt, distance, elevation, azimuth = self._places(index)
         grid = self.viewpoints
         return Orbit(
@@ -223,7 +223,7 @@ class GridPoses(Poses):
         )
 
     def fill(self, index: int) -> float | None:
-        """The share that this index stands for."""
+        """The filled share at this index."""
         distance = self.viewpoints.distance
         return axis_value(distance.fill, self._places(index)[1]) if isinstance(distance, Fill) else None
 
@@ -268,7 +268,7 @@ class JitteredPoses(Poses):
         )
 
     def fill(self, index: int) -> float | None:
-        """The grid pose's."""
+        """The filled share of the grid's pose."""
         return self._grid.fill(index // self.viewpoints.count)
 
     @cached_property
@@ -292,7 +292,9 @@ class SpherePoses(Poses):
         return f"draw {index}"
 
     def view(self, index: int) -> Orbit:
-        """Azimuth, the sine of the elevation, distance and tilt, each uniform; distance 1 where a share is to be filled."""
+        """Azimuth, the sine of the elevation, distance and tilt, each uniform; distance 1 if the distance follows from a filled
+        share.
+        """
         part = self.viewpoints
         u = self._shares(index)
         low, high = (math.sin(math.radians(e)) for e in part.elevation)
@@ -358,14 +360,14 @@ def _between(ends: tuple[float, float], share: float) -> float:
 @dataclass(frozen=True)
 class ListedPoses(Poses):
     """Poses of a file. A motion's target is the point on the optical axis that is nearest to the models, 1 m ahead of the
-    camera if that lies behind it.
+    camera if that point is behind it.
     """
 
     viewpoints: PoseList
     file: PoseFile
 
     def drawn_for(self, name: str) -> Poses:
-        """The same: nothing is random."""
+        """The same poses: nothing is random."""
         return self
 
     @property
@@ -375,7 +377,7 @@ class ListedPoses(Poses):
 
     @property
     def digest(self) -> str:
-        """SHA-256 of the poses and the lens, and of all that a file of shots says."""
+        """SHA-256 of the poses, the lens, and the whole content of a file of shots."""
         shots = "".join(shot.said.model_dump_json() for shot in self.file.shots)
         return hashlib.sha256((repr(self.file) + shots).encode()).hexdigest()
 
@@ -390,11 +392,13 @@ class ListedPoses(Poses):
 
     @property
     def lowest_elevation(self) -> float:
-        """Of orbits; motions may be below the ground, or not, whatever their angles."""
+        """The lowest elevation of orbits; for motions, elevation does not tell whether they are below the ground."""
         return min((view.elevation for view, target in self._views if target is None), default=90.0)
 
     def name(self, index: int) -> str:
-        """The pose's values, and how often they were there before: a camera that rests has equal poses; a shot's own name."""
+        """The pose's values, and the number of earlier equal poses, because a resting camera has several; for a shot, its own
+        name.
+        """
         return self._names[index]
 
     def view(self, index: int) -> Orbit:
@@ -436,7 +440,7 @@ def _shot_name(shot: Arranged) -> str:
 
 
 def world_turn(viewpoints: PoseList, file: PoseFile) -> Float:
-    """Our world from a file's, (3, 3)."""
+    """The rotation from a file's world to the recipe's, (3, 3)."""
     up = viewpoints.up or file.up
     from viewsphere.assets.normalise import rotation as axes_rotation  # which loads meshes
 
@@ -444,13 +448,13 @@ def world_turn(viewpoints: PoseList, file: PoseFile) -> Float:
 
 
 def placed(motion: Extrinsics, turn: Float, viewpoints: PoseList) -> Float:
-    """The pose of a file's camera in our world, (4, 4), metres, OpenCV axes."""
+    """The pose of a file's camera in the recipe's world, (4, 4), metres, OpenCV axes."""
     rotation = transform(turn, motion.R)  # rows: the camera's axes
     return rigid(rotation.T, viewpoints.scale * transform(turn, np.subtract(motion.center, viewpoints.origin)))
 
 
 def poses(viewpoints: Viewpoints, seed: int, folder: Path = Path()) -> Poses:
-    """The poses of a recipe's viewpoints; `seed` and `folder`, from which paths start, are the recipe's.
+    """The poses of a recipe's viewpoints; `seed` and `folder`, the base of relative paths, are the recipe's.
 
     Raises RecipeError for a file of poses that cannot be read.
     """

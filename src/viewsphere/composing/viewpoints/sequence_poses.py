@@ -19,13 +19,13 @@ from viewsphere.recipe.cameras.viewpoints import Viewpoints
 
 @dataclass(frozen=True)
 class SequencePoses(RepeatedPoses):
-    """Poses that stand still for all instants of a sequence; the pose is the outer loop, the instant the inner one."""
+    """Poses that are still at all instants of a sequence; the pose is the outer loop, the instant the inner one."""
 
     instants: int
 
     @property
     def digest(self) -> str:
-        """SHA-256 of the number of instants, and of what stands in a file of poses."""
+        """SHA-256 of the number of instants, and of the digest of the poses."""
         return hashlib.sha256(repr((self.base.digest, self.instants)).encode()).hexdigest()
 
     @property
@@ -34,11 +34,11 @@ class SequencePoses(RepeatedPoses):
         return {**self.base.counts, "instants": self.instants}
 
     def taken(self, index: int) -> int:
-        """The sequence's pose, named after the sequence among those of its subject."""
+        """The number of the sequence's pose, which is the number of the sequence among those of its subject."""
         return index // self.instants
 
     def name(self, index: int) -> str:
-        """The pose's and the instant's."""
+        """The names of the pose and the instant."""
         return f"{self.place(index)} at instant {index % self.instants}"
 
     def _pose(self, index: int) -> Viewpoint:
@@ -47,13 +47,13 @@ class SequencePoses(RepeatedPoses):
 
 @dataclass(frozen=True)
 class TrajectoryPoses(Poses):
-    """One motion of the camera; where that leads is known when its world is."""
+    """One motion of the camera; its poses are known only once its world is."""
 
     trajectory: Trajectory
 
     @property
     def digest(self) -> str:
-        """SHA-256 of what stands in a file of the motion."""
+        """The digest of the trajectory."""
         return self.trajectory.digest
 
     @property
@@ -63,7 +63,7 @@ class TrajectoryPoses(Poses):
 
     @property
     def lowest_elevation(self) -> float:
-        """Nothing is known of it."""
+        """The lowest elevation: unknown."""
         return 90.0
 
     @property
@@ -73,7 +73,7 @@ class TrajectoryPoses(Poses):
 
     @property
     def are_known(self) -> bool:
-        """Not before the world is."""
+        """False: the poses depend on the world."""
         return False
 
     def target(self, index: int) -> Vector | None:
@@ -85,11 +85,11 @@ class TrajectoryPoses(Poses):
         return "trajectory"
 
     def view(self, index: int) -> Orbit:
-        """No place: one that stands for all."""
+        """A placeholder orbit, because the poses depend on the world."""
         return Orbit(0.0, 0.0, 1.0, 0.0)
 
     def drawn_for(self, name: str) -> TrajectoryPoses:
-        """The same: what is random is drawn for each sequence."""
+        """The same poses: random values are drawn for each sequence."""
         return self
 
 

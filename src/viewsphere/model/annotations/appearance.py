@@ -1,4 +1,4 @@
-"""The appearance of a model, in numbers from which words are made."""
+"""The appearance of a model as numbers, from which captions get their words."""
 
 from __future__ import annotations
 
@@ -27,9 +27,9 @@ Word = Annotated[str, Field(min_length=1, max_length=LONGEST), AfterValidator(_w
 class Patch(OmitNone):
     """The parts of a model that have one material, one basic colour and one word for the material.
 
-    Their share is that of the model's visible surface. The means over them are the colour (linear [r, g, b]), metallic,
+    `share` is their share of the model's visible surface. Means over these parts give the colour (linear [r, g, b]), metallic,
     roughness, and the share of light that passes through. `coated`: whether a clear coat makes them glossy. `stays`: whether
-    they keep their material where models are made of another material, because they are not opaque.
+    they keep their material when the recipe gives models another material, because they are not opaque.
     """
 
     OMIT_IF_NONE = ("stays",)
@@ -45,7 +45,7 @@ class Patch(OmitNone):
 
 
 class Appearance(Frozen):
-    """The surface of a model in patches, and the words for colour and material that somebody said of it, if anybody did."""
+    """The surface of a model in patches, and the words for colour and material from its sidecar or recipe, if any."""
 
     patches: tuple[Patch, ...] = ()
     color: Word | None = None

@@ -1,7 +1,7 @@
-"""Classes of all that is seen, things and stuff: what semantic and panoptic maps tell apart.
+"""The classes of semantic and panoptic maps: things and stuff.
 
-Stuff is what is no object: sky, ground, scenery. Its classes have the ids 1 to 31, the same in all data sets: new ones are
-added at the end. A thing's class is 31 more than its category's id. 0 is no class.
+Stuff is everything but objects: sky, ground, scenery. Stuff classes have the ids 1 to 31, the same in all data sets: new ones
+are added at the end. A thing's class is 31 more than its category's id. 0 is no class.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ STUFF: dict[str, Color] = {
     "furniture": (224, 5, 255),
     "household item": (255, 122, 8),
 }
-"""Names of stuff, in the order of their ids, and colours, sRGB: those of Cityscapes, else of ADE20K, where it has the class."""
+"""Names of stuff, in the order of their ids, and sRGB colours: from Cityscapes if it has the class, else from ADE20K."""
 
 STUFF_IDS = {name: i for i, name in enumerate(STUFF, 1)}
 SKY, GROUND, SCENERY = (STUFF_IDS[name] for name in ("sky", "ground", "scenery"))
@@ -55,7 +55,9 @@ def thing_class(category_id: int) -> int:
 
 
 def class_colors(count: int = MOST_COLORS) -> NDArray[np.uint8]:
-    """The colours (count, 3) of classes 0, 1, ...: a thing's is PASCAL VOC's of its category's id, or of that less 255s."""
+    """The colours (count, 3) of classes 0, 1, .... A thing has PASCAL VOC's colour of its category's id, minus multiples of
+    255.
+    """
     things = np.resize(palette()[1:], (max(count - FIRST_THING, 0), 3))
     stuff = np.zeros((FIRST_THING, 3), np.uint8)
     stuff[1 : 1 + len(STUFF)] = list(STUFF.values())

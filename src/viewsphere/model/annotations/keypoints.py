@@ -28,7 +28,7 @@ _OTHER = {"left": "right", "right": "left", "l": "r", "r": "l"}
 
 
 def left_and_right(names: Iterable[str]) -> tuple[Pair, ...]:
-    """The pairs among names that say left and right, in words or as a letter of its own: `hand_left`, `LeftHand`, `hand.L`."""
+    """The pairs among names that contain left and right, as words or separate letters: `hand_left`, `LeftHand`, `hand.L`."""
     names = list(names)
     others = {name: _SIDE.sub(_turned, name) for name in names}
     is_left = {name: (side := _SIDE.search(name)) is not None and side[0].lower() in ("left", "l") for name in names}
@@ -42,7 +42,7 @@ def _turned(side: re.Match[str]) -> str:
 
 
 def is_name(text: str) -> bool:
-    """Return whether a point may be called so."""
+    """Return whether this is a valid name of a point."""
     return 0 < len(text) <= LONGEST_NAME and text.isprintable() and text == text.strip()
 
 
@@ -59,9 +59,9 @@ Place = tuple[Number, Number, Number]
 
 
 class Keypoints(Frozen):
-    """Points of a model's own axes, metres, by their names, in their order.
+    """Named points in a model's own axes, metres, in order.
 
-    `skeleton` are lines between two of them, and `flips` those that change places in a mirror image, left before right.
+    `skeleton` holds lines between two points. `flips` holds the pairs that a mirror image exchanges, left before right.
     """
 
     points: dict[PointName, Place] = Field(min_length=1, max_length=MOST_POINTS)
@@ -84,13 +84,13 @@ class Keypoints(Frozen):
         return self
 
     def only(self, names: Collection[str]) -> Keypoints | None:
-        """Return the keypoints of these names, with the pairs among them; None if there are none."""
+        """Return the keypoints with these names, and the pairs among them; None if there are none."""
         points = {name: place for name, place in self.points.items() if name in names}
         skeleton, flips = (tuple(pair for pair in pairs if points.keys() >= {*pair}) for pairs in (self.skeleton, self.flips))
         return Keypoints(points=points, skeleton=skeleton, flips=flips) if points else None
 
     def moved(self, similarity: ArrayLike) -> Keypoints:
-        """The same points in other axes, to which `similarity` (4, 4) takes points of these."""
+        """The same points in other axes; `similarity` (4, 4) transforms points from these axes to the others."""
         places = transform(similarity, [*self.points.values()]).tolist()
         return self.model_copy(update={"points": {name: tuple(place) for name, place in zip(self.points, places, strict=True)}})
 
@@ -103,8 +103,9 @@ def _once(values: list[T], what: str, words: Callable[[T], str]) -> None:
 
 @dataclass(frozen=True)
 class At:
-    """A place in the box around a part: its centre, or by `where` (x, y, z) from -1 to 1 towards its sides; for an edge or a
-    corner of the box the part's nearest vertex. Of several `parts`, `seat_pad|seat`, the first that a model has counts.
+    """A place in the box around a part: its centre, or the point at `where` (x, y, z), from -1 to 1 towards its sides. For an
+    edge or a corner of the box, it is the part's nearest vertex. Of several `parts`, `seat_pad|seat`, the first that the model
+    has is used.
     """
 
     parts: str
@@ -112,6 +113,8 @@ class At:
 
 
 def sided(name: str, parts: str, where: Place = (0.0, 0.0, 0.0)) -> dict[str, At]:
-    """The points `name_left` and `name_right`: `{}` in `parts` is left or right, and `where` is that of the left, at +X."""
+    """The points `name_left` and `name_right`: `{}` in `parts` is replaced by left or right, and `where` is the place of the
+    left point, at +X.
+    """
     x, y, z = where
     return {f"{name}_left": At(parts.format("left"), where), f"{name}_right": At(parts.format("right"), (-x, y, z))}

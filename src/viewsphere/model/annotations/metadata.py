@@ -11,17 +11,17 @@ from viewsphere.model.annotations.symmetries import Symmetries
 
 
 def unknown() -> Appearance | None:
-    """Nobody knows what the model looks like."""
+    """None: the appearance of the model is unknown."""
     return None
 
 
 @dataclass(frozen=True)
 class ModelMetadata:
-    """Facts about a model in its own axes, metres: the largest distance between two of its vertices; its symmetries, None where
-    nobody has said or looked, which is not the same as none; its named points, None without any; the words that are said of its
-    colour and material, None without; and `looks`, which looks at it.
+    """Facts about a model in its own axes, metres: the largest distance between two vertices, symmetries, named points, the
+    words for its colour and material, and `looks`, which computes its appearance. Symmetries are None if they were neither
+    declared nor searched for, which differs from having none; the points and the words are None if there are none.
 
-    Of a model that deforms, symmetries are known as it rests, and points that its file does not move.
+    A model that deforms has the symmetries of its rest pose, and the points that its file does not move.
     """
 
     diameter: float

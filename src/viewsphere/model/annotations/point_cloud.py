@@ -1,4 +1,4 @@
-"""Point clouds: what the pixels of a sample show, as points with colours and labels."""
+"""Point clouds: the surfaces in the pixels of a sample, as points with colours and labels."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ Axes = Literal["camera", "world"]
 Surface = Literal["visible", "complete"]
 
 VISIBLE = 0
-"""The state of `surface_samples` that are seen."""
+"""The state of visible `surface_samples`."""
 
 
 @dataclass(frozen=True, eq=False)
 class PointCloud:
     """points (N, 3) float64, metres, in the axes that `axes` names; colors (N, 3) uint8 sRGB, normals (N, 3) float32 in the
-    same axes, towards the camera, instances (N,) int32, 0 for none, categories (N,) int32 likewise: None where the sample does
-    not keep what they follow from. visible (N,) bool: whether the camera sees them.
+    same axes, towards the camera, instances (N,) int32, 0 for none, categories (N,) int32 likewise: None where the sample lacks
+    the channels that they come from. visible (N,) bool: whether the camera sees them.
     """
 
     axes: Axes
@@ -43,7 +43,7 @@ class PointCloud:
 
     @classmethod
     def of(cls, sample: Sample, axes: Axes = "camera", surface: Surface = "visible") -> PointCloud:
-        """As `Sample.point_cloud` says."""
+        """Return the points of a sample; see `Sample.point_cloud`."""
         for name, value, known in (("axes", axes, get_args(Axes)), ("surface", surface, get_args(Surface))):
             if value not in known:
                 raise UserError(f"point_cloud: {name}: {one_of(value, known)}")
@@ -51,7 +51,7 @@ class PointCloud:
         return cloud.moved(sample) if axes == "world" else cloud
 
     def moved(self, sample: Sample) -> PointCloud:
-        """The same in the world's axes, of points in those of a sample's camera."""
+        """The point cloud in the world's axes, converted from the axes of the sample's camera."""
         camera = sample.camera
         normals = None if self.normals is None else transform(camera.R.T, self.normals).astype(np.float32)
         points = transform(camera.R.T, self.points - camera.t)
@@ -59,7 +59,7 @@ class PointCloud:
 
 
 def _visible(sample: Sample) -> PointCloud:
-    """A point for each pixel that shows something, row by row."""
+    """A point for each pixel that shows a surface, row by row."""
     rays = pixel_rays(sample.camera.intrinsics)
     if "depth_ray" in sample.channels:
         lengths = _needed(sample, "depth_ray").astype(np.float64)
@@ -81,7 +81,7 @@ def _visible(sample: Sample) -> PointCloud:
 
 
 def _complete(sample: Sample) -> PointCloud:
-    """The points of `surface_samples`, seen or not; colours are not known of those that are not."""
+    """The points of `surface_samples`, visible or not; hidden points have no colours."""
     rows, camera = _needed(sample, "surface_samples"), sample.camera
     points, normals = transform(camera.R, rows["point"]) + camera.t, transform(camera.R, rows["normal"])
     ids = np.ascontiguousarray(rows["object"])
@@ -89,7 +89,7 @@ def _complete(sample: Sample) -> PointCloud:
 
 
 def _labels(sample: Sample, instances: NDArray[Any] | None) -> tuple[NDArray[np.int32], NDArray[np.int32]] | tuple[None, None]:
-    """Objects and their categories."""
+    """The object and the category of each point."""
     if instances is None:
         return None, None
     table = np.zeros(max([int(instances.max(initial=0)), *(o.id for o in sample.objects)], default=0) + 1, np.int32)

@@ -9,8 +9,8 @@ from viewsphere.model.fields.numbers import Natural
 
 
 class ProceduralMaterial(Frozen):
-    """One piece of a material of `viewsphere.materials`: its name, what colours, sizes and grain are drawn from, and the
-    texels of its pictures a side.
+    """One piece of a material of `viewsphere.materials`: its name, the seed of its colours, sizes and grain, and the side of
+    its pictures in texels.
     """
 
     name: str = Field(min_length=1)

@@ -56,11 +56,11 @@ def _unit(axis: Vector) -> Vector:
 
 
 ALIKE = 0.01
-"""Radians by which two rotations may differ that are one symmetry's."""
+"""Largest angle, in radians, between two rotations that count as one symmetry."""
 
 
 class Continuous(Frozen):
-    """A model stays as it is, turned by any angle around the line through `offset` along the unit vector `axis`."""
+    """A symmetry under turns by any angle around the line through `offset` along the unit vector `axis`."""
 
     axis: Annotated[tuple[Number, Number, Number], AfterValidator(_unit)]
     offset: tuple[Number, Number, Number] = (0.0, 0.0, 0.0)
@@ -72,11 +72,11 @@ class Continuous(Frozen):
 
 
 class Symmetries(Frozen):
-    """Motions of a model's own axes, in metres, after which its surface is where it was, as BOP's `models_info` has them.
+    """Motions in a model's own axes, metres, that map its surface onto itself, as in BOP's `models_info`.
 
-    `discrete` are rigid (4, 4), without the identity; `continuous` any turn around an axis. All symmetries are the products of
-    a discrete one, or the identity, and a turn around one of the continuous axes, or none. A ball has three continuous axes,
-    which stand for all rotations. Mirror images are no motions.
+    `discrete` are rigid motions (4, 4), without the identity; `continuous` are turns by any angle around an axis. All
+    symmetries are the products of a discrete one, or the identity, and a turn around one of the continuous axes, or none. A
+    ball has three continuous axes, which represent all rotations. Mirror images are not included.
     """
 
     discrete: tuple[Motion, ...] = Field(default=(), max_length=MOST)
@@ -90,8 +90,8 @@ class Symmetries(Frozen):
             yield from (compose(turn, discrete) for turn in turns)
 
     def unlisted(self) -> tuple[int, int] | None:
-        """Places of two discrete symmetries that, one after the other, make one that is not listed; None if all are, and where
-        there are continuous ones, which join them. What is bounded has at most one symmetry of each rotation.
+        """Indices of two discrete symmetries whose product is not listed; None if all products are, or if there are continuous
+        symmetries, which join them. A bounded surface has at most one symmetry for each rotation.
         """
         if self.continuous:
             return None
@@ -104,7 +104,7 @@ class Symmetries(Frozen):
         return None
 
     def moved(self, similarity: ArrayLike) -> Symmetries:
-        """The same symmetries in other axes: `similarity` (4, 4) takes points of these there, and may scale them."""
+        """The same symmetries in other axes: `similarity` (4, 4) transforms points to those axes, and may scale them."""
         m = np.asarray(similarity, np.float64)
         scale = math.sqrt(float((m[0, :3] ** 2).sum()))
         turn = m[:3, :3] / scale

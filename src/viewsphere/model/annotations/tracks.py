@@ -11,20 +11,19 @@ from viewsphere.model.fields.frozen import Frozen
 from viewsphere.model.fields.numbers import Count
 
 Query = tuple[int, float, float]
-"""An instant of the sequence, and a position in the picture then, (x, y) in pixels."""
+"""An instant of the sequence, and a position (x, y) in its picture, in pixels."""
 
 TRACK = np.dtype([("instant", "<i4"), ("query", "<f8", (2,)), ("object", "<i4"), ("point", "<f8", (4,)), ("state", "u1")])
 """One point in one sample: the instant and the position (x, y), pixels, at which its sensor picked it; the id of the object
-that it lies on, 0 for none; where it is in the world, homogeneous: (x, y, z, 1) in metres, (x, y, z, 0) the direction of a
-point of the sky, NaN where it is not there; and its state in the picture: 0 visible, 1 occluded, 2 outside, 3 behind, 4
-invalid.
+under the point, 0 for none; its world position, homogeneous: (x, y, z, 1) in metres, (x, y, z, 0) the direction of a point of
+the sky, NaN where it is not there; and its state in the picture: 0 visible, 1 occluded, 2 outside, 3 behind, 4 invalid.
 """
 
 
 class Tracks(Frozen):
     """The points that each sensor of a sequence follows.
 
-    They are a grid of pixels with this spacing, or `count` pixels drawn `on` objects or on all of the picture, or listed
+    The points are a grid of pixels with this spacing, or `count` random pixels `on` objects or on the whole picture, or listed
     `points`. Each point is picked at every instant of `at`. The draws follow from `seed`.
     """
 

@@ -1,4 +1,4 @@
-"""Voxels: the grid of a view's cells, what is in each, and the runs that it is kept as."""
+"""Voxels: the grid of cells of a view, the content of each cell, and the runs in which it is stored."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ from viewsphere.model.fields.numbers import Count, Metres, Positive
 from viewsphere.model.sensors.camera import Camera
 
 OUTSIDE, FREE, SURFACE, OCCLUDED = range(4)
-"""A cell's state for the camera: its centre is in no pixel; it is in front of the surface in its pixel; a visible point lies in
-it; its centre is behind the surface in its pixel.
+"""A cell's state for the camera: its centre is outside the picture; its centre is in front of the surface in its pixel; the
+cell contains a visible point; its centre is behind the surface in its pixel.
 """
 
 EMPTY, TOUCHED, INSIDE = range(3)
-"""Content of a cell: nothing; a surface; the inside of an object, all around."""
+"""Content of a cell: nothing; a surface; only the inside of an object."""
 
 RUN = np.dtype(
     [
@@ -34,17 +34,17 @@ RUN = np.dtype(
         ("indoors", "u1"),
     ]
 )
-"""Cells one after another that are equal: how many; class as in `semantic`, 0 where the cell is empty; object, 0 for none; what
-the cell holds (0 nothing, 1 a surface, 2 an object's inside); how it is seen (0 outside of the picture, 1 free, 2 a surface
-that is seen, 3 occluded); and whether its centre is between scenery above and scenery or ground below.
+"""A run of equal cells: their number; class as in `semantic`, 0 where the cell is empty; object, 0 for none; content (0
+nothing, 1 a surface, 2 an object's inside); state (0 outside the picture, 1 free, 2 a visible surface, 3 occluded); and whether
+its centre is between scenery above and scenery or ground below.
 """
 
 LEVEL = 1e-6
-"""The level part of a viewing direction below which a camera looks straight up or down."""
+"""Length of a viewing direction's horizontal part below which a camera counts as looking straight up or down."""
 
 
 ROOM = 1 + 1e-6
-"""Size of the cube around a model, in its longest sides: the farthest face is inside a cell."""
+"""Side of the cube around a model, as a multiple of the model's longest side: keeps the outermost faces inside cells."""
 
 
 class Voxels(Frozen):
@@ -70,8 +70,8 @@ class Voxels(Frozen):
 
 @dataclass(frozen=True, eq=False)
 class Grid:
-    """Cells along the axes ahead, up and right, which stay level; `cell` metres each. `world_from_grid` (4, 4), rigid: the
-    grid's own axes are metres from the corner of its first cell.
+    """Cells along the axes ahead, up and right, which stay level; `cell` metres each. `world_from_grid` (4, 4) is rigid: the
+    grid's own coordinates are metres from the corner of its first cell.
     """
 
     size: tuple[int, int, int]
@@ -90,7 +90,7 @@ class Grid:
         return cls(options.size, options.cell, np.array(rows))
 
     def cells(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Points (N, 3) of the world counted in cells from the grid's corner: cell (i, j, k) has those from i, j, k on."""
+        """World points (N, 3) in units of cells from the grid's corner: the floor of the coordinates is the cell (i, j, k)."""
         m = self.world_from_grid
         x, y, z = (points[:, i] - m[i, 3] for i in range(3))
         return np.column_stack([(m[0, i] * x + m[1, i] * y + m[2, i] * z) / self.cell for i in range(3)])
@@ -102,14 +102,14 @@ class Grid:
 
 
 def _middle(camera: Camera, distance: float) -> tuple[float, float]:
-    """The point of the camera's axis so far away, seen from above."""
+    """The world x and y of the point on the camera's axis at this distance."""
     x, y = (camera.center + distance * camera.R[2])[:2].tolist()
     return x, y
 
 
 def _heading(camera: Camera) -> tuple[float, float]:
-    """The level direction in which the camera looks, of unit length; of one that looks straight down or up, where the top of
-    its picture points, or the bottom.
+    """The horizontal direction in which the camera looks, of unit length. For a camera that looks straight down or up, it is
+    the direction of the top, or the bottom, of its picture.
     """
     _, down, forward = camera.R.tolist()
     x, y, _ = forward
@@ -122,8 +122,9 @@ def _heading(camera: Camera) -> tuple[float, float]:
 
 @dataclass(frozen=True, eq=False)
 class Occupancy:
-    """The cells of a cube around a model, `filled` (n, n, n) uint8 along the object's x, y and z: 0 nothing, 1 a triangle has a
-    part in the cell, 2 its centre is inside. `cell`: its side, metres; `corner` (3,): that of the first cell, object axes.
+    """The cells of a cube around a model, `filled` (n, n, n) uint8 along the object's x, y and z: 0 nothing, 1 a triangle
+    crosses the cell, 2 its centre is inside the model. `cell`: side of a cell, metres; `corner` (3,): corner of the first cell,
+    object axes.
     """
 
     filled: NDArray[np.uint8]
@@ -132,7 +133,7 @@ class Occupancy:
 
     @classmethod
     def of(cls, vertices: NDArray[np.float32], triangles: NDArray[np.int32], cells: int) -> Occupancy:
-        """Of a mesh, whose longest side is so many cells; raises ValueError for more cells than are allowed, or less than 1."""
+        """The cells of a mesh whose longest side is `cells` long; raises ValueError for less than 1 or too many."""
         if not 1 <= cells**3 <= limits.MAX_VOXELS:
             raise ValueError(f"occupancy: expected 1 to {limits.MAX_VOXELS:,} cells in all, found {cells} along each side")
         used = vertices[np.unique(triangles)].astype(np.float64) if len(triangles) else np.zeros((1, 3))
@@ -167,7 +168,7 @@ class VoxelGrid:
 
     @classmethod
     def of(cls, runs: NDArray[Any], grid: Grid) -> Self:
-        """The cells of runs (N,) of `RUN`; raises ValueError where these are more or fewer than the grid has."""
+        """The cells of runs (N,) of `RUN`; raises ValueError if the grid has another number of cells."""
         count, filled = math.prod(grid.size), int(runs["length"].sum(dtype=np.uint64))
         if filled != count:
             raise ValueError(f"voxels: expected runs of {count:,} cells, found {filled:,}")

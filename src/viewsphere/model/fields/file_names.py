@@ -1,4 +1,4 @@
-"""Names that every file system takes as the name of a file or folder, so that a data set can be carried from one to another."""
+"""Names of files and folders that are valid on every file system, so that data sets can be copied between systems."""
 
 from __future__ import annotations
 
@@ -12,5 +12,5 @@ https://learn.microsoft.com/en-us/windows/win32/fileio/naming-a-file
 
 
 def is_reserved(name: str) -> bool:
-    """Return whether Windows takes a name, with any ending, for a device's."""
+    """Return whether Windows treats a name, with any ending, as a device."""
     return name.partition(".")[0].rstrip(" ").lower() in RESERVED

@@ -20,11 +20,11 @@ from pydantic_core import CoreSchema, core_schema
 from viewsphere.validation.errors import explained
 
 _built: ContextVar[type[BaseModel] | None] = ContextVar("_built", default=None)
-"""The class that pydantic builds a validator of; classes within it get theirs when they are first used."""
+"""The class whose validator pydantic is building now; classes of its fields get theirs at their first use."""
 
 
 def _written(value: Any, info: SerializationInfo) -> Any:
-    """A part as its own class writes it; what is no such part, as a copy may hold it, stays as it is."""
+    """A field's value, serialised by its own class; values of other types, which a copy may hold, are unchanged."""
     if not isinstance(value, BaseModel):
         return value
     return value.model_dump(
@@ -40,8 +40,8 @@ def _written(value: Any, info: SerializationInfo) -> Any:
 class Frozen(BaseModel):
     """An immutable value; unknown fields, NaN and infinity are errors, and the nearest valid field is named.
 
-    A class's validator is built when its first instance is made, and not together with those that have it as a field: a recipe
-    uses 30 of 170 classes, and building the others took a tenth of a second of each start.
+    A class's validator is built when its first instance is made, rather than together with the classes that have it as a field:
+    a recipe uses 30 of 170 classes, and building the others took a tenth of a second of each start.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, defer_build=True)

@@ -7,10 +7,10 @@ from typing import Any, ClassVar
 
 
 class Shown:
-    """Something of which notebooks show HTML instead of text."""
+    """An object that notebooks show as HTML instead of text."""
 
     html_of: ClassVar[Callable[[Any], str]]
-    """Makes the HTML of any of these; set when the package is imported."""
+    """Returns the HTML of such an object; set when the package is imported."""
 
     def _repr_html_(self) -> str:
         return type(self).html_of(self)

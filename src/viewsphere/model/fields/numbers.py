@@ -7,7 +7,7 @@ from typing import Annotated
 from pydantic import BeforeValidator, Field
 
 LARGEST = 1e9
-"""Largest absolute value of any number in a recipe (metres, degrees, pixels): anything beyond lies outside of every picture."""
+"""Largest absolute value of any number in a recipe (metres, degrees, pixels): anything beyond is outside every picture."""
 
 FARTHEST = 1e5
 """Largest distance, in metres, of anything from a scene's middle, equal to the largest model: float32 is too coarse beyond."""

@@ -1,4 +1,4 @@
-"""Plain data that is written without what it does not say."""
+"""Plain data that is written without its unset fields."""
 
 from typing import Any, ClassVar
 
@@ -8,7 +8,7 @@ from viewsphere.model.fields.frozen import Frozen
 
 
 class OmitNone(Frozen):
-    """Plain data that is written without those of its fields in `OMIT_IF_NONE` that are None."""
+    """Plain data that is written without the fields of `OMIT_IF_NONE` that are None."""
 
     OMIT_IF_NONE: ClassVar[tuple[str, ...]] = ()
 

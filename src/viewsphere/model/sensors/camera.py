@@ -1,4 +1,4 @@
-"""The camera: its lens (intrinsics) and, for one frame, where it stands (extrinsics)."""
+"""The camera: its lens (intrinsics) and, for one frame, its pose (extrinsics)."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from viewsphere.geometry.rotation import transform
 from viewsphere.model.fields.frozen import Frozen
 
 Distortion = Annotated[SerializeAsAny[LensParameters], BeforeValidator(read_parameters)]
-"""The model of a lens and its parameters; a mapping of these is read as its model's class."""
+"""The model of a lens and its parameters; a mapping is read as the class of its model."""
 
 
 class Intrinsics(Frozen):

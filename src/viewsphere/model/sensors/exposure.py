@@ -1,4 +1,4 @@
-"""The motion while the shutter is open: for motion blur, which pictures show and labels do not."""
+"""The motion while the shutter is open, for motion blur, which affects pictures but not labels."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from viewsphere.model.thing import Motion, TimeStep
 
 
 class Sweep(Frozen):
-    """A motion around an instant: its poses and time steps at `moments`, which increase. They are times after the instant, in
-    shares of the time between two instants; what lies between two of them is interpolated.
+    """A motion around an instant: its poses and time steps at `moments`, which increase. Moments are times after the instant,
+    as shares of the time between two instants; poses between two moments are interpolated.
 
-    Moments may lie outside of the time for which the shutter is open: a mesh goes on from the time step that the instant before
-    shows (moment -1) to those of the instant (0) and of the one after (1).
+    Moments may be outside the time for which the shutter is open: a mesh moves from its time step at the previous instant
+    (moment -1) to those at the instant (0) and at the next one (1).
     """
 
     moments: tuple[float, ...] = Field(min_length=2)
@@ -36,13 +36,15 @@ class Sweep(Frozen):
         return self
 
     def pose(self, moment: float) -> Matrix4 | None:
-        """The pose at a moment: straight on and turning the shorter way between two known ones; None where it is not there."""
+        """The pose at a moment, interpolated between two known poses on a straight line and the shorter rotation; None where
+        the thing is absent.
+        """
         before, after, share = self._around(moment)
         start, end = self.motion.at(before), self.motion.at(after)
         return start if start is None or end is None or start == end else _between(start, end, share)
 
     def steps(self, moment: float) -> tuple[TimeStep | None, TimeStep | None, float]:
-        """The known time steps around a moment, and how far from the first to the second it is, 0 to 1."""
+        """The known time steps before and after a moment, and its position between them, 0 to 1."""
         before, after, share = self._around(moment)
         return self.motion.step_at(before), self.motion.step_at(after), share
 
@@ -55,7 +57,7 @@ class Sweep(Frozen):
 class Exposure(Frozen):
     """The motion around one instant: a sweep for each thing of a shot, and one for the rig (world from rig).
 
-    A sweep is None for a thing that stands still or is not there, and for a rig that stands still.
+    A sweep is None for a thing that is still or absent, and for a rig that is still.
     """
 
     things: tuple[Sweep | None, ...]
@@ -63,7 +65,7 @@ class Exposure(Frozen):
 
 
 def _between(start: Matrix4, end: Matrix4, share: float) -> Matrix4:
-    """A rigid pose between two: no sines, which differ by processor, since what is turned by little turns evenly without."""
+    """A rigid pose between two others. Uses no sines, which differ by processor; small rotations are uniform without them."""
     a, b = np.array(start), np.array(end)
     p, q = (np.array(quaternion_from_matrix(m[:3, :3])) for m in (a, b))
     q = q if float((p * q).sum()) >= 0 else -q
@@ -74,7 +76,7 @@ def _between(start: Matrix4, end: Matrix4, share: float) -> Matrix4:
 
 
 def beyond(now: Matrix4, other: Matrix4) -> Matrix4:
-    """The pose as far from `now` as another, on its other side: straight on, and turned on by as much."""
+    """The pose `other` mirrored at `now`: the same step and the same rotation, continued beyond `now`."""
     a, b = np.array(now), np.array(other)
     turned = product(product(a[:3, :3], b[:3, :3].T), a[:3, :3])
     rows: Any = rigid(turned, 2 * a[:3, 3] - b[:3, 3]).tolist()

@@ -1,4 +1,4 @@
-"""LiDAR: how a sensor measures along the rays of its scan, and one point that it returns."""
+"""LiDAR: the measurement along the rays of a scan, and the record of one returned point."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from viewsphere.model.fields.frozen import Frozen
 from viewsphere.model.fields.numbers import Length, Natural, Portion, Positive
 
 LIDAR = "lidar"
-"""The channel of the points that a LiDAR returns, which it keeps by default, and cameras do not have."""
+"""The channel of the points that a LiDAR returns; LiDARs keep it by default, cameras lack it."""
 
 POINT = np.dtype(
     [
@@ -26,21 +26,22 @@ POINT = np.dtype(
         ("column", "<u2"),
     ]
 )
-"""One point: where it is in the LiDAR's axes (x ahead, y left, z up), metres; its distance along the ray, metres; the power
-that comes back; the angle between ray and surface normal, 0 to pi/2; seconds from the instant to when it is measured; object
-and category, 0 for none; its ring, counted from the highest, and its column, counted from the left.
+"""One point: position in the LiDAR's axes (x ahead, y left, z up), metres; its distance along the ray, metres; the returned
+power; the angle between ray and surface normal, 0 to pi/2; seconds from the instant to the measurement; object and category, 0
+for none; its ring, counted from the highest, and its column, counted from the left.
 """
 
 Curve = tuple[tuple[Annotated[float, Field(ge=0)], Portion], ...]
-"""Probabilities at some values, which ascend: in between they are linear, beyond them those of the ends; none: 0."""
+"""Probabilities at ascending values: linear in between, constant beyond the ends, 0 if the list is empty."""
 
 
 class Lidar(Frozen):
     """`range` (metres): nearer and farther points do not return. A white surface seen straight on returns intensity 1 at
-    `reference_range` metres, and the square of the distance weakens it; None: the sensor makes up for the distance.
+    `reference_range` metres, and intensity falls with the square of the distance; None: the sensor compensates for the
+    distance.
 
     `sigma` (metres) is the standard deviation of measured ranges; `dropout` the probability that a point does not return, by
-    its true range and by its intensity besides. `seed` is what draws follow from.
+    its true range and, in addition, by its intensity. `seed` determines the random draws.
 
     The columns are measured one after another, from the left, within `sweep` seconds, with the instant in the middle.
     """

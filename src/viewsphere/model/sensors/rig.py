@@ -20,9 +20,9 @@ CAMERA = "camera"
 
 
 class Sensor(OmitNone):
-    """A camera or a LiDAR of a rig: its lens, and where it is mounted. `rig_from_sensor` is rigid, OpenCV axes on both sides,
-    metres. `channels` are those of the shot's that it keeps, None: a camera all but points, a LiDAR these alone. `lidar`: how
-    it measures; None: it is a camera.
+    """A camera or a LiDAR of a rig: its lens and its mounting. `rig_from_sensor` is rigid, OpenCV axes on both sides, metres.
+    `channels` are the channels of the shot that it keeps; None: all but points for a camera, points alone for a LiDAR. `lidar`
+    holds the measurement settings; None for a camera.
     """
 
     OMIT_IF_NONE = ("channels", "lidar")
@@ -65,13 +65,13 @@ class Rig(Frozen):
 
     @property
     def rectified(self) -> tuple[Pair, ...]:
-        """The pairs of sensors with equal pinhole lenses and equal axes, of which one stands along the other's x axis."""
+        """The pairs of sensors with equal pinhole lenses and equal axes, one of them on the other's x axis."""
         numbered = permutations(enumerate(self.sensors), 2)
         pairs = ((i, j, _baseline(left, right)) for (i, left), (j, right) in numbered)
         return tuple(Pair(i, j, baseline) for i, j, baseline in pairs if baseline is not None)
 
     def partner(self, sensor: int) -> tuple[str, float] | None:
-        """Name of the first sensor that is rectified with another one, counted from 0, and the metres between them; or None."""
+        """Name of the first sensor that is rectified with this one (counted from 0), and their distance in metres; or None."""
         pairs = self.rectified
         beside = sorted((right if left == sensor else left, b) for left, right, b in pairs if sensor in (left, right))
         return (self.sensors[beside[0][0]].name, beside[0][1]) if beside else None

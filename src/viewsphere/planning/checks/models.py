@@ -31,7 +31,7 @@ from viewsphere.validation.suggestions import suggestion
 
 
 def check_redraws(recipe: Recipe) -> None:
-    """Something can be drawn again where too little is seen of a model; only still pictures may be empty."""
+    """Check that a recipe that redraws for visibility has values to redraw, and that only still pictures may be empty."""
     for name in ("min_visibility", "wanted", "empty") if recipe.time is not None else ():
         if getattr(recipe, name) is not None:
             raise RecipeError(f"{name}: expected none beside time, as it is about single pictures; found one: leave it out")
@@ -47,7 +47,7 @@ def check_redraws(recipe: Recipe) -> None:
 
 
 def check_distractors(recipe: Recipe) -> None:
-    """There are models to be told from distractors, and distractors where some are asked for, and only there."""
+    """Check that the recipe has labelled models, and that it has distractors exactly if it asks for them."""
     unlabelled = [i for i, entry in enumerate(recipe.models) if not entry.is_labelled]
     asked = span(recipe.scenes.distractors)[1] if isinstance(recipe.scenes, ScenesEntry) else 0
     if len(unlabelled) == len(recipe.models):
@@ -64,7 +64,9 @@ def check_distractors(recipe: Recipe) -> None:
 
 
 def check_names(recipe: Recipe) -> None:
-    """The engine, the formats, the sampler, the placer and the channels are known, and still pictures are enough for these."""
+    """Check that the engine, the formats, the sampler, the placer and the channels are known, and work with still pictures if
+    the recipe has no time.
+    """
     _check_plugin("engine", "engines", recipe.engine.name)
     for i, entry in enumerate(recipe.formats):
         _check_plugin(f"formats[{i}]", "formats", entry.name)
@@ -96,14 +98,14 @@ def check_names(recipe: Recipe) -> None:
 
 
 def _check_plugin(field: str, kind: plugins.Kind, name: str) -> None:
-    """A plug-in that is known."""
+    """Check that a plug-in is known."""
     known = plugins.names(kind)
     if name not in known:
         raise RecipeError(f"{field}: {one_of(name, known)}")
 
 
 def _check_annotation(recipe: Recipe, where: str, name: str) -> None:
-    """A label that can be asked for, with what it needs."""
+    """Check that a label is available, and that the recipe has its requirements."""
     if is_channel(name):
         raise RecipeError(f"{where}: expected a label of objects or of pictures; found {name}, which is one of channels")
     if label_named(name) and not is_on_request(name):
@@ -116,7 +118,7 @@ def _check_annotation(recipe: Recipe, where: str, name: str) -> None:
 
 
 def _unknown(name: str, known: tuple[str, ...]) -> str:
-    """The message of a name that is no such label, with a word where a label that every data set has is meant."""
+    """The message for an unknown label, with a note if the name means a label that every data set has."""
     meant = None if suggestion(name, known) else suggestion(name, labels())
     if meant is None or meant in on_request() or meant in channels():
         return one_of(name, known)
@@ -124,7 +126,7 @@ def _unknown(name: str, known: tuple[str, ...]) -> str:
 
 
 def _check_options(recipe: Recipe, name: str, given: Mapping[str, JsonValue]) -> None:
-    """Options of a label that the recipe names."""
+    """Check the options of a requested label."""
     label = label_named(name)
     if label is None:
         raise RecipeError(f"labels: {one_of(name, tuple(name for name, label in labels().items() if label.options))}")
@@ -139,7 +141,7 @@ def _check_options(recipe: Recipe, name: str, given: Mapping[str, JsonValue]) ->
 
 
 def check_needs(recipe: Recipe, where: str, name: str) -> None:
-    """See that the recipe has what a label compares: instants, sensors, a LiDAR, tracks; raises RecipeError."""
+    """Check that the recipe has the inputs of a label: instants, sensors, a LiDAR, tracks; raises RecipeError."""
     label = label_named(name)
     for need in label.needs if label else ():
         if need.is_missing(recipe):
@@ -148,7 +150,7 @@ def check_needs(recipe: Recipe, where: str, name: str) -> None:
 
 
 def _check_painted(recipe: Recipe, where: str, name: str) -> None:
-    """A pass needs an engine that paints it, and what surfaces are made of needs materials that viewsphere made."""
+    """Check that the engine supports a pass; passes of materials also need materials made by viewsphere."""
     paints = _engine(recipe).paints
     if name in PASSES and name not in paints:
         raise RecipeError(
@@ -163,7 +165,7 @@ def _check_painted(recipe: Recipe, where: str, name: str) -> None:
 
 
 def check_blend(recipe: Recipe) -> None:
-    """A .blend file as the scene needs an engine that renders it."""
+    """Check that the engine renders .blend files, if the scene is one."""
     if recipe.scene.blend is not None and not _engine(recipe).opens_scenes:
         raise RecipeError(
             f"scene.blend: expected engine: cycles, eevee or workbench, which render the file; found {recipe.engine.name}: "
@@ -172,7 +174,7 @@ def check_blend(recipe: Recipe) -> None:
 
 
 def check_catcher(recipe: Recipe) -> None:
-    """A ground that may be a shadow catcher needs an engine that has one."""
+    """Check that the engine supports shadow catchers, if the ground may be one."""
     scene = recipe.scene
     grounds = [scene.automatic_ground if ground == "auto" else ground for ground in alternatives(scene.ground)]
     catches = any(ground == "catcher" or (isinstance(ground, GroundEntry) and ground.catcher) for ground in grounds)
@@ -188,7 +190,7 @@ def _engine(recipe: Recipe) -> EngineSpec:
 
 
 def check_frames(recipe: Recipe, views: Poses) -> None:
-    """Not more models x poses than are wanted at most, where these are what is taken."""
+    """Check that models x poses do not exceed the limit, if the sampler renders their product."""
     if recipe.scenes is not None:
         return
     models, count = count_models(recipe), math.prod(views.counts.values())
@@ -201,7 +203,7 @@ def check_frames(recipe: Recipe, views: Poses) -> None:
 
 
 def check_sizes(recipe: Recipe, views: Poses, sampler: SamplerSpec) -> None:
-    """Pictures that take their lenses from a file are of one size, unless the sampler makes them of any."""
+    """Check that pictures with lenses from a file have one size, unless the sampler supports several."""
     if not recipe.camera.of_viewpoints or sampler.of_any_size:
         return
     sizes = {f"{lens.width} x {lens.height}" for i in range(len(views)) if (lens := views.lens(i))}
@@ -213,7 +215,7 @@ def check_sizes(recipe: Recipe, views: Poses, sampler: SamplerSpec) -> None:
 
 
 def check_all_frames(recipe: Recipe, frames: int, factors: str) -> None:
-    """Not more frames than are wanted at most, with all time steps or scenes."""
+    """Check that the number of frames, with all time steps or scenes, does not exceed the limit."""
     if frames > recipe.max_frames:
         raise RecipeError(
             f"models: expected at most {recipe.max_frames:,} frames; found {frames:,} ({factors}): "
@@ -222,7 +224,7 @@ def check_all_frames(recipe: Recipe, frames: int, factors: str) -> None:
 
 
 def check_listed(recipe: Recipe, specs: tuple[ModelSpec, ...]) -> None:
-    """The models that the splits list have to be there, once; if no split has a share, all have to be listed."""
+    """Check that models listed in splits exist and are listed once; if no split has a share, all models must be listed."""
     keys, seen = {spec.key for spec in specs}, dict[str, str]()
     for name, listed in recipe.splits.shares.items():
         for key in listed if isinstance(listed, tuple) else ():
@@ -238,7 +240,7 @@ def check_listed(recipe: Recipe, specs: tuple[ModelSpec, ...]) -> None:
 
 
 def check_photo(recipe: Recipe) -> None:
-    """A photograph as the background has its own weather and hour: fog and night do not reach it."""
+    """Refuse fog and night with a photograph as the background, which has its own weather and hour."""
     scene = recipe.scene
     if not any(entry.image is not None or entry.images is not None for entry in scene.backgrounds):
         return
@@ -263,7 +265,7 @@ def check_shutter(recipe: Recipe) -> None:
 
 
 def check_splits(recipe: Recipe) -> None:
-    """Splits by place need a place."""
+    """Check that a recipe with splits by place has a place."""
     if recipe.splits.by == "place" and recipe.scene.place is None:
         raise RecipeError(
             "splits.by: expected scene.place, whose draws it tells apart; found none: set one, or split by model, pose or frame"
@@ -271,7 +273,7 @@ def check_splits(recipe: Recipe) -> None:
 
 
 def check_materials(recipe: Recipe, specs: tuple[ModelSpec, ...]) -> None:
-    """Every change of materials is for some model."""
+    """Check that every change of materials matches some model."""
     for i, entry in enumerate(recipe.scene.materials):
         if not any(fnmatchcase(spec.key, entry.models) for spec in specs):
             raise RecipeError(

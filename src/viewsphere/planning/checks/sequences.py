@@ -24,16 +24,16 @@ if TYPE_CHECKING:
     from viewsphere.planning.plan import Plan
 
 MOST_SUBJECTS = 1000
-"""Subjects that are looked at beforehand, the first ones; the others are when their shots are made."""
+"""Number of subjects that are checked before rendering, the first ones; the others are checked when their shots are made."""
 
 UNKNOWN = (np.nan, np.nan, np.nan)
-"""Position of a thing whose model was not read."""
+"""Placeholder position of a thing whose model was not read."""
 
 
 def check_sequences(planned: Plan) -> None:
-    """Raise RecipeError for lanes that there are not, for looks at things that are not there, and for motions that cannot be.
+    """Raise RecipeError for missing lanes, for cameras that look at absent things, and for impossible motions.
 
-    Each is looked for in the first sequence of a subject; motions drawn for later ones, when these are made.
+    The first sequence of each subject is checked; motions drawn for later sequences are checked when these are made.
     """
     checked = set[str]()
     for subject in planned.subjects[:MOST_SUBJECTS]:
@@ -45,7 +45,7 @@ def check_sequences(planned: Plan) -> None:
 
 
 def _check_trajectory(planned: Plan, subject: str, cast: Sequence[ModelSpec], lanes: tuple[Lane, ...]) -> None:
-    """Ask for the rig at the first and at the last instant, in a world where nobody knows where the things are."""
+    """Compute the rig's pose at the first and at the last instant, with placeholder positions of the things."""
     assert isinstance(planned.pose_list, SequencePoses)
     if not isinstance(planned.pose_list.base, TrajectoryPoses):
         return
@@ -60,7 +60,7 @@ def _check_trajectory(planned: Plan, subject: str, cast: Sequence[ModelSpec], la
 
 
 def _check_thing(planned: Plan, wanted: int | str, cast: Sequence[ModelSpec]) -> None:
-    """Scenery may be looked at, too, which is known when it is placed."""
+    """Check that the thing that the camera looks at exists. It may also be scenery, which is known only once placed."""
     known = {number: spec.key for number, spec in enumerate(cast, 1)}
     scenery = planned.composition
     if isinstance(wanted, int):
@@ -72,7 +72,7 @@ def _check_thing(planned: Plan, wanted: int | str, cast: Sequence[ModelSpec]) ->
 
 
 def _check_motions(planned: Plan, subject: str, cast: Sequence[ModelSpec], lanes: tuple[Lane, ...], checked: set[str]) -> None:
-    """Make the motions of models, each model's once."""
+    """Make the motions of the models, once for each model."""
     names = (subject, planned.pose_list.place(0))
     company, scenes = planned.recipe.scene.company, planned.recipe.scenes
     entry = scenes if isinstance(scenes, ScenesEntry) else company
@@ -90,7 +90,7 @@ def _nowhere(seconds: float) -> Matrix4:
 
 
 def _check_pieces(planned: Plan) -> None:
-    """Make the motions of a place's pieces, each pattern's once."""
+    """Make the motions of a place's pieces, once for each pattern."""
     subject, pose = planned.subjects[0], planned.scene_pose(0)
     names = (subject, planned.pose_list.place(0))
     lanes = () if planned.composition is None else planned.composition.lanes(subject, pose)

@@ -1,4 +1,4 @@
-"""Warnings for recipes with empty pictures: no light, an exposure that hides all, a camera that looks away.
+"""Warnings for recipes with empty pictures: no light, an exposure that hides everything, a camera that looks away.
 
 The checks read the recipe alone, so lamps and photographed skies have a wide margin.
 """
@@ -28,19 +28,19 @@ from viewsphere.recipe.world.scene import SceneEntry
 Float = NDArray[np.float64]
 
 MOST_POSES = 1000
-"""Poses that are looked at, evenly over all."""
+"""Number of checked poses, evenly spaced over all."""
 
 UNKNOWN = 30.0
 """Uncertainty of a light's brightness, as a factor of its strength: a lamp may be near, and a photograph varies."""
 
 DARK, BRIGHT = 2.0**-10, 16.0
-"""Radiance that every view transform shows as black, and as white."""
+"""Radiances that every view transform shows as black and as white."""
 
 DRAWS = 20
 """Number of random poses that are drawn for a mean."""
 
 MOSTLY = 2 / 3
-"""Share of the picture; a camera that looks ahead has half of it below the horizon."""
+"""Share of the picture covered by ground that triggers a warning; a level camera has half of the picture below the horizon."""
 
 BLACKEST = 0.02
 """Reflectance of the darkest paint."""
@@ -63,7 +63,7 @@ def no_light(scene: SceneEntry) -> Iterator[str]:
 
 
 def hidden_by_exposure(scene: SceneEntry) -> Iterator[str]:
-    """A warning for an exposure that makes white black, or black white."""
+    """A warning for an exposure that turns white into black, or black into white."""
     lit = [light for light in _lights(scene) if light[1] > 0]
     if not lit or scene.blend is not None or scene.view.exposure == "auto":
         return
@@ -75,9 +75,9 @@ def hidden_by_exposure(scene: SceneEntry) -> Iterator[str]:
 
 
 def out_of_view(recipe: Recipe, views: Poses, lens: Intrinsics) -> Iterator[str]:
-    """A warning if the models' centre is in no picture, or jitter moves it out of some; of scenes it is not known.
+    """A warning if the models' centre is in no picture, or if jitter moves it out of some; random scenes are not checked.
 
-    How large the models are is not known yet: near ones may still be seen.
+    The models' sizes are not known yet: near ones may still be visible.
     """
     scene = recipe.scene
     if not lens.lens.is_linear or not views.are_known:
@@ -110,7 +110,7 @@ def out_of_view(recipe: Recipe, views: Poses, lens: Intrinsics) -> Iterator[str]
 
 
 def hidden_background(scene: SceneEntry, views: Poses, lens: Intrinsics) -> Iterator[str]:
-    """A warning if an endless ground hides most of the photographs that are to be the background, in the mean of the poses."""
+    """A warning if an endless ground hides most of the background photographs, on average over the poses."""
     pictures = [entry for entry in scene.backgrounds if entry.image is not None or entry.images is not None]
     if not pictures or not scene.always_has_ground:
         return
@@ -124,8 +124,8 @@ def hidden_background(scene: SceneEntry, views: Poses, lens: Intrinsics) -> Iter
 
 
 def too_small(recipe: Recipe, views: Poses, lens: Intrinsics) -> Iterator[str]:
-    """A warning for each entry of models of which the recipe says how long they are, or how much they fill, and that is less
-    than `SMALLEST` pixels at the farthest viewpoint.
+    """A warning for each entry whose models are smaller than `SMALLEST` pixels at the farthest viewpoint, if the recipe gives
+    their length or the share of the picture that they fill.
     """
     chosen = _some(views)
     fills = [fill for i in chosen if (fill := views.fill(i)) is not None]
@@ -146,19 +146,19 @@ def too_small(recipe: Recipe, views: Poses, lens: Intrinsics) -> Iterator[str]:
 
 
 def _some(views: Poses, most: int = MOST_POSES) -> list[int]:
-    """Numbers of at most so many poses, evenly over all."""
+    """Numbers of at most `most` poses, evenly spaced over all."""
     # Not np.unique: it imports numpy.ma, 8 ms.
     return sorted(set(np.linspace(0, len(views) - 1, min(len(views), most)).round().astype(int).tolist()))
 
 
 def _below_horizon(elevation_deg: float, lens: Intrinsics) -> float:
-    """The share of a picture's height that lies below the horizon, for a camera without tilt and distortion."""
+    """The share of a picture's height below the horizon, for a camera without tilt and distortion."""
     horizon = lens.cy - lens.fy * math.tan(math.radians(min(max(elevation_deg, -89), 89)))
     return min(max(1 - horizon / lens.height, 0.0), 1.0)
 
 
 def _length(entry: ModelEntry) -> float | None:
-    """The longest side, metres, that a recipe says models have; of a length that is scaled to, that."""
+    """The longest side, metres, of an entry's models, from their dimensions or from the length to which they are scaled."""
     if isinstance(entry.scale, Length):
         return span(entry.scale.length)[0]
     size = entry.real_size if entry.scale == "real_size" else None
@@ -166,13 +166,15 @@ def _length(entry: ModelEntry) -> float | None:
 
 
 def _offset(views: Poses, index: int) -> Float:
-    """From what a camera looks at to where it stands, (3,)."""
+    """The offset (3,) from a camera's target to the camera."""
     view = views.view(index)
     return orbit_center(math.radians(view.azimuth), math.radians(view.elevation), view.distance)
 
 
 def _misses(targets: Float, offset: Float, widest: float) -> bool:
-    """Return whether the origin is out of a picture that looks at one of the targets (N, 3) from this offset (3,) to it."""
+    """Return whether the origin is outside the picture of a camera that looks at one of the targets (N, 3) from this offset
+    (3,).
+    """
     distance = float(np.linalg.norm(offset))
     along = targets @ (offset / distance)
     beside = np.linalg.norm(targets - along[:, None] * (offset / distance), axis=1)
@@ -181,7 +183,7 @@ def _misses(targets: Float, offset: Float, widest: float) -> bool:
 
 
 def _lights(scene: SceneEntry) -> Iterator[tuple[float, float]]:
-    """About the least and the greatest radiance of white, for every pair of skies and suns that there may be."""
+    """The approximate least and greatest radiance of white, for every possible pair of sky and sun."""
     lamps = 0.0
     for lamp in scene.lights:
         color = max(span(lamp.color)[1], span(getattr(lamp, "below", 0.0))[1])

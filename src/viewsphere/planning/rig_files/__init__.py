@@ -1,7 +1,7 @@
 """Calibrations of rigs: OpenCV's YAML, Kalibr's camchain, ROS' camera_info.
 
-All three count pixels from the centre of the first one; here they are counted from the image's corner, so that principal points
-are moved by half a pixel.
+All three measure pixel coordinates from the centre of the first pixel. Here the origin is the image's corner, so that principal
+points are shifted by half a pixel.
 """
 
 from __future__ import annotations
@@ -20,8 +20,8 @@ __all__ = ["Calibrated", "read_rig"]
 def read_rig(paths: Sequence[Path], kind: str = "auto", rectified: bool = False) -> tuple[Calibrated, ...]:
     """The sensors of a rig's calibration files, the first being the rig's origin.
 
-    `kind` is `opencv`, `kalibr`, `camera_info`, or `auto`: by what the first file holds. `rectified`: the pinholes of P instead
-    of the raw lenses. Raises RecipeError, with the file, for anything that cannot be read or is not there.
+    `kind` is `opencv`, `kalibr`, `camera_info`, or `auto`: by the content of the first file. `rectified`: the pinholes of P
+    instead of the raw lenses. Raises RecipeError, with the file, for missing or unreadable files.
     """
     documents = {path: read_document(path) for path in paths}
     kind = _kind(paths[0], documents[paths[0]]) if kind == "auto" else kind

@@ -1,7 +1,7 @@
 """ROS' camera_info, a file for each camera, as `camera_calibration` writes it
 (https://docs.ros.org/en/api/sensor_msgs/html/msg/CameraInfo.html).
 
-R turns the raw camera to the rectified one; P[0, 3] = -fx' times the metres from the first camera.
+R rotates the raw camera's axes to the rectified ones; P[0, 3] is -fx' times the metres from the first camera.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ MODELS = ("plumb_bob", "rational_polynomial", "equidistant", "fisheye", "")
 
 
 def sensors(documents: Mapping[Path, dict[str, Any]], rectified: bool) -> tuple[Calibrated, ...]:
-    """A sensor of each file, named by its `camera_name`, or by the file; the first one's place is the rig's."""
+    """A sensor for each file, named by its `camera_name` or the file's name; the first sensor is the rig's origin."""
     calibrated = [_camera(path, document, rectified) for path, document in documents.items()]
     back = inverse(calibrated[0].rig_from_sensor[:3, :3], calibrated[0].rig_from_sensor[:3, 3])
     first = Calibrated(calibrated[0].name, calibrated[0].lens, calibrated[0].distortion, np.eye(4), calibrated[0].size)
@@ -31,7 +31,7 @@ def sensors(documents: Mapping[Path, dict[str, Any]], rectified: bool) -> tuple[
 
 
 def _camera(path: Path, found: Mapping[str, Any], rectified: bool) -> Calibrated:
-    """A camera's lens, and its place in the axes that all of them are rectified to."""
+    """A camera's lens, and its pose in the common rectified axes."""
     k, p = (matrix(found.get(f"{n}_matrix"), f"{path}: {n}_matrix") for n in ("camera", "projection"))
     if k.shape != (3, 3) or p.shape != (3, 4):
         raise RecipeError(

@@ -1,4 +1,4 @@
-"""YAML of calibrations: OpenCV's own dialect, and the one of all others."""
+"""YAML of calibrations: OpenCV's dialect, and standard YAML."""
 
 from __future__ import annotations
 
@@ -18,7 +18,9 @@ Float = NDArray[np.float64]
 
 
 class _Loader(ShallowLoader):
-    """Plain data; `!!opencv-matrix` is the mapping that follows, and OpenCV 5's `!!opencv-nd-matrix` of a vector one column."""
+    """A loader of plain data; `!!opencv-matrix` becomes a mapping, and a vector in OpenCV 5's `!!opencv-nd-matrix` becomes one
+    column.
+    """
 
 
 def _as_mapping(loader: yaml.SafeLoader, node: yaml.MappingNode) -> dict[Any, Any]:
@@ -40,9 +42,9 @@ _Loader.add_constructor("tag:yaml.org,2002:opencv-nd-matrix", _as_columns)
 
 
 def read_document(path: Path) -> dict[str, Any]:
-    """A calibration file's mapping; raises RecipeError for a file that is none.
+    """A calibration file's mapping; raises RecipeError for any other file.
 
-    OpenCV writes `%YAML:1.0`, which is no directive of YAML (https://docs.opencv.org/4.x/da/d56/group__core__xml.html).
+    OpenCV writes `%YAML:1.0`, which is not a valid YAML directive (https://docs.opencv.org/4.x/da/d56/group__core__xml.html).
     """
     text = read_text(path, "a calibration", "MAX_RIG_BYTES")
     if text.startswith("%YAML:"):
@@ -59,7 +61,7 @@ def read_document(path: Path) -> dict[str, Any]:
 
 
 def matrix(value: Any, where: str, shape: tuple[int, int] | None = None) -> Float:
-    """A matrix that a file holds as `{rows, cols, data}` or as a list of rows; raises RecipeError for another shape."""
+    """A matrix, stored as `{rows, cols, data}` or as a list of rows; raises RecipeError for another shape."""
     if isinstance(value, dict):
         entry = cast("dict[str, Any]", value)
         data = row(entry.get("data"), f"{where}.data")
@@ -88,7 +90,7 @@ def row(value: Any, where: str) -> list[float]:
 
 
 def size(width: Any, height: Any, where: str) -> tuple[int, int] | None:
-    """[width, height] of pictures, None where the file says nothing; raises RecipeError for anything that is no size."""
+    """The pictures' [width, height], None if the file has none; raises RecipeError for an invalid size."""
     if width is None or height is None:
         return None
     sides = number(width, where), number(height, where)

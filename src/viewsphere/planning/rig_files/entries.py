@@ -25,8 +25,8 @@ RIGHT_ANGLES = 1e-3
 
 @dataclass(frozen=True, eq=False)
 class Calibrated:
-    """A sensor: focal lengths and principal point in pixels (`fx`, `fy`, `cx`, `cy`, from the image's corner), its place
-    (4, 4) in metres, and its size if the file says it.
+    """A sensor: focal lengths and principal point in pixels (`fx`, `fy`, `cx`, `cy`, from the image's corner), its pose (4, 4)
+    in metres, and its size if the file has one.
     """
 
     name: str
@@ -37,7 +37,7 @@ class Calibrated:
 
 
 def pinhole(camera: Float, where: str) -> dict[str, float]:
-    """The lens of a calibration's camera matrix (3, 3 or more), whose pixels are counted from the centre of the first one."""
+    """The lens of a calibration's camera matrix (3, 3 or more), with pixels measured from the centre of the first one."""
     fx, fy = float(camera[0, 0]), float(camera[1, 1])
     if min(fx, fy) <= 0:
         raise RecipeError(f"{where}: expected focal lengths above 0; found {fx:g} and {fy:g}")
@@ -45,9 +45,7 @@ def pinhole(camera: Float, where: str) -> dict[str, float]:
 
 
 def brown_conrady(numbers: Sequence[float], where: str) -> LensParameters | None:
-    """OpenCV's k1 k2 p1 p2 [k3 [k4 k5 k6 [s1 s2 s3 s4 [tx ty]]]], of which those from s1 on have to be 0; None where all
-    are.
-    """
+    """OpenCV's k1 k2 p1 p2 [k3 [k4 k5 k6 [s1 s2 s3 s4 [tx ty]]]], where all from s1 on must be 0; None if all are 0."""
     if len(numbers) not in (0, 4, 5, 8, 12, 14):
         raise RecipeError(f"{where}: expected 4, 5, 8, 12 or 14 numbers; found {len(numbers)}")
     if any(numbers[8:]):
@@ -61,7 +59,7 @@ def brown_conrady(numbers: Sequence[float], where: str) -> LensParameters | None
 
 
 def fisheye(numbers: Sequence[float], where: str) -> LensParameters:
-    """Four numbers of Kannala and Brandt; all 0 is the equidistant fisheye."""
+    """The four coefficients of Kannala and Brandt; if all are 0, the equidistant fisheye."""
     if len(numbers) != 4:
         raise RecipeError(f"{where}: expected 4 numbers; found {len(numbers)}")
     with told_of(where):
@@ -69,7 +67,7 @@ def fisheye(numbers: Sequence[float], where: str) -> LensParameters:
 
 
 def rotation(matrix: Float, where: str) -> Float:
-    """The rotation (3, 3) that a file's matrix nearly is; raises RecipeError for any other."""
+    """The rotation (3, 3) nearest to a file's matrix; raises RecipeError if they differ too much."""
     rotation = nearest_rotation(matrix) if matrix.shape == (3, 3) else None
     if rotation is None or np.abs(rotation - matrix).max() > RIGHT_ANGLES:
         raise RecipeError(f"{where}: expected a rotation; found a matrix that is none")
@@ -77,6 +75,6 @@ def rotation(matrix: Float, where: str) -> Float:
 
 
 def inverse(turn: Float, shift: Float) -> Float:
-    """The motion (4, 4) back from x -> turn x + shift."""
+    """The inverse (4, 4) of the motion x -> turn x + shift."""
     back = np.ascontiguousarray(turn.T)
     return rigid(back, -transform(back, shift))

@@ -1,4 +1,4 @@
-"""Kalibr's camchain: cam0, cam1, ..., each with `T_cn_cnm1`, which takes points of the camera before to this one
+"""Kalibr's camchain: cam0, cam1, ..., each with `T_cn_cnm1`, which transforms points from the previous camera to this one
 (https://github.com/ethz-asl/kalibr/wiki/yaml-formats).
 """
 

@@ -24,8 +24,8 @@ Float = NDArray[np.float64]
 
 
 def sensors(documents: Mapping[Path, dict[str, Any]], rectified: bool) -> tuple[Calibrated, ...]:
-    """`left` and `right`: the raw cameras, or with `rectified` the pinholes of P1 and P2. Lenses of 4 numbers are fisheyes
-    where the file says `model: fisheye`.
+    """`left` and `right`: the raw cameras, or with `rectified` the pinholes of P1 and P2. Lenses with 4 coefficients are
+    fisheyes if the file has `model: fisheye`.
     """
     where = ", ".join(map(str, documents))
     found = dict(chain.from_iterable(document.items() for document in documents.values()))

@@ -1,4 +1,4 @@
-"""Samplers: which shots a recipe means, and what is in each.
+"""Samplers: the shots of a recipe, and their content.
 
 A sampler is one module with a `SamplerSpec`; none imports another. Samplers make their shots from a `SamplingContext`.
 """
@@ -25,8 +25,8 @@ Options = TypeVar("Options", bound=Frozen)
 
 @dataclass(frozen=True, eq=False)
 class Standing:
-    """The objects in place, without scenery, while a subject is taken from some poses (their numbers in `views`).
-    Cameras look at `target`, None: the first object's centre.
+    """The placed objects, without scenery, for some poses of a subject (their numbers in `views`). Cameras look at `target`;
+    None: the first object's centre.
     """
 
     things: tuple[Thing, ...]
@@ -36,6 +36,6 @@ class Standing:
 
 
 def options_of(recipe: Recipe, kind: type[Options]) -> Options:
-    """A recipe's options of its sampler, as the sampler's class of them reads them."""
+    """The options of a recipe's sampler, read by the sampler's class of options."""
     given = recipe.scenes.options if isinstance(recipe.scenes, SamplerEntry) else {}
     return read_options(kind, given, "scenes")

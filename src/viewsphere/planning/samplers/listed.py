@@ -1,4 +1,4 @@
-"""Shots as a file lists them: each with its camera, and with models where they are."""
+"""Shots that a file lists, each with its camera and the poses of its models."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from viewsphere.validation.quantity import quantity
 
 
 def subjects(recipe: Recipe, specs: Sequence[ModelSpec]) -> tuple[str, ...]:
-    """The shots' names. Raises RecipeError, a line a mistake, for shots of models and splits that the recipe does not have."""
+    """The shots' names. Raises RecipeError, a line per error, for shots with models or splits that the recipe lacks."""
     _check(recipe)
     path, shots = _file(recipe)
     keys = {spec.key for spec in specs}
@@ -75,19 +75,19 @@ def cast(context: SamplingContext, subject: str, pose: int | None) -> tuple[Mode
 
 
 def split(context: SamplingContext, subject: str, pose: int) -> str:
-    """The shot's own, else what its name draws."""
+    """The shot's own split, else one drawn from its name."""
     if context.recipe.splits.by == "scene":
         return context.dealt_splits[subject]
     return _shots(context)[subject].said.split or context.hashed_split(subject, pose)
 
 
 def standing(context: SamplingContext, subject: str, box_of: BoxOf) -> Iterator[Standing]:
-    """Nothing: where a listed camera is, is meant so."""
+    """Nothing: the positions of listed cameras are intended, so they are not checked."""
     return iter(())
 
 
 def shot(context: SamplingContext, subject: str, poses: Sequence[int], box_of: BoxOf, key: str, first: int) -> Shot:
-    """The models of a shot where the file has them, and what stands around them, seen by its camera."""
+    """The shot with its models at the file's poses, their surroundings, and its camera."""
     (pose,) = poses
     things = _things(context, _shots(context)[subject])
     if context.composition is not None:
@@ -103,7 +103,7 @@ def shot(context: SamplingContext, subject: str, poses: Sequence[int], box_of: B
 
 
 def _things(context: SamplingContext, shot: Arranged) -> tuple[Thing, ...]:
-    """The objects of a shot, with the motions that the recipe's viewpoints make of their file's world."""
+    """The objects of a shot, with poses converted from the file's world by the recipe's viewpoints."""
     entry, file = _listed(context).viewpoints, _listed(context).file
     turn = world_turn(entry, file)
 
@@ -128,7 +128,7 @@ def _shots(context: SamplingContext) -> dict[str, Arranged]:
 
 
 def _file(recipe: Recipe) -> tuple[Path, tuple[Arranged, ...]]:
-    """The file of shots, and those that are taken. Raises RecipeError where the viewpoints are no such file."""
+    """The file of shots, and the shots in use. Raises RecipeError if the viewpoints are not such a file."""
     entry = recipe.viewpoints
     if isinstance(entry, PoseList):
         path = recipe.folder / Path(entry.path).expanduser()
@@ -142,7 +142,7 @@ def _file(recipe: Recipe) -> tuple[Path, tuple[Arranged, ...]]:
 
 
 def _check(recipe: Recipe) -> None:
-    """Raise RecipeError for what has no place beside listed shots."""
+    """Raise RecipeError for settings that listed shots do not support."""
     if recipe.time is not None:
         raise RecipeError("time: expected none beside sampler: listed, whose shots are still pictures; found one: leave it out")
     if is_animated(recipe):

@@ -1,4 +1,4 @@
-"""Models x poses, as in the paper: every frame is about one model, taken from a pose, at each of its time steps."""
+"""Models x poses, as in the paper: every frame shows one model from a pose, at each of its time steps."""
 
 from __future__ import annotations
 
@@ -58,17 +58,17 @@ def blocks(context: SamplingContext) -> tuple[Block, ...]:
 
 
 def most_objects(recipe: Recipe) -> int:
-    """The model and its company."""
+    """The number of models: one and its company."""
     return 1 + (recipe.scene.company.number if recipe.scene.company else 0)
 
 
 def cast(context: SamplingContext, subject: str, pose: int | None) -> tuple[ModelSpec, ...]:
-    """The model and those that stand beside it; only the model without a pose where company is drawn for each frame."""
+    """The model and its company; without a pose, the model alone if company is drawn for each frame."""
     return context.with_company(subject, pose)
 
 
 def split(context: SamplingContext, subject: str, pose: int) -> str:
-    """The model's, or what its pose, place or name draw."""
+    """The model's split, or one drawn from the pose, place or name."""
     return context.dealt_splits[subject] if context.recipe.splits.by == "model" else context.hashed_split(subject, pose)
 
 
@@ -90,7 +90,7 @@ def standing(context: SamplingContext, subject: str, box_of: BoxOf) -> Iterator[
 
 
 def shot(context: SamplingContext, subject: str, poses: Sequence[int], box_of: BoxOf, key: str, first: int) -> Shot:
-    """The model, company and scenery, from poses of one time step."""
+    """The shot of a model with company and scenery, from poses of one time step."""
     spec = context.spec(subject)
     things, target = (Thing(id=1, model=spec),), None
     if context.composition is not None:
@@ -118,7 +118,7 @@ def shot(context: SamplingContext, subject: str, poses: Sequence[int], box_of: B
 
 
 def _seen_from(context: SamplingContext, subject: str, poses: Sequence[int]) -> tuple[float, float] | None:
-    """Azimuth and elevation of the camera of a shot's only pose; None where shots have several."""
+    """Azimuth and elevation of the camera if shots have a single pose, else None."""
     if not context.recipe.scene.is_moved_each_frame or isinstance(context.pose_list, TimedPoses):
         return None
     view = context.viewpoint(subject, context.view(context.pose_list.for_subject(subject), poses[0]), None)

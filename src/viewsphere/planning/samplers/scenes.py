@@ -1,4 +1,4 @@
-"""Random scenes: in each some models are drawn and placed, and the camera goes around the middle of them."""
+"""Random scenes: each has random models in random places, and cameras around their middle."""
 
 from __future__ import annotations
 
@@ -59,7 +59,9 @@ def factors(context: SamplingContext) -> str:
 
 
 def blocks(context: SamplingContext) -> tuple[Block, ...]:
-    """Return the blocks of every scene, with all poses or the drawn ones. Raises RecipeError where too few models may meet."""
+    """Return the blocks of every scene, with all poses or the drawn ones. Raises RecipeError if too few models can share a
+    scene.
+    """
     check_scene_models(context)
     if not are_views_drawn(context):
         return (Block(context.subjects, ((0, len(context.pose_list)),)),)
@@ -78,7 +80,9 @@ def cast(context: SamplingContext, subject: str, pose: int | None) -> tuple[Mode
 
 
 def split(context: SamplingContext, subject: str, pose: int) -> str:
-    """The scene's, or what its pose, place or name draw; by model, what the scene draws before its models."""
+    """The scene's split, or one drawn from the pose, place or name; with splits by model, the split drawn before the scene's
+    models.
+    """
     match context.recipe.splits.by:
         case "scene":
             return context.dealt_splits[subject]
@@ -89,7 +93,7 @@ def split(context: SamplingContext, subject: str, pose: int) -> str:
 
 
 def standing(context: SamplingContext, subject: str, box_of: BoxOf) -> Iterator[Standing]:
-    """The models of a scene; nothing where the place they stand in is drawn for each frame."""
+    """The placed models of a scene; nothing if their place is drawn for each frame."""
     if not context.recipe.scene.is_moved_each_frame and not is_slow(scenes_entry(context.recipe).layout):
         things = scene_things(context, subject, None, box_of)
         views, poses = context.pose_list.for_subject(subject), tuple(numbers(_poses(context, subject)))
@@ -97,7 +101,7 @@ def standing(context: SamplingContext, subject: str, box_of: BoxOf) -> Iterator[
 
 
 def shot(context: SamplingContext, subject: str, poses: Sequence[int], box_of: BoxOf, key: str, first: int) -> Shot:
-    """The models of a scene, and what stands around them; cameras look at the middle of the models."""
+    """The shot of a scene's models and their surroundings; cameras look at the middle of the models."""
     pose = context.scene_pose(poses[0])
     targets = things = scene_things(context, subject, pose, box_of)
     middle = center_of_all(things, box_of)

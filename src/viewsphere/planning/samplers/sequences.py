@@ -1,7 +1,7 @@
-"""Worlds over time: every model with its company, or every random scene, is one sequence from each viewpoint that stands still.
+"""Worlds over time: every model with its company, or every random scene, is one sequence for each still viewpoint.
 
-A sequence's things, and what its camera does, follow from its names alone, and an instant from its number: shots may cut it
-anywhere. Shots carry the instants that labels of theirs need, too.
+A sequence's things and camera motion depend only on its names, and an instant only on its number, so that shots may divide it
+anywhere. Shots also contain the instants that their labels need.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ from viewsphere.store import Block
 from viewsphere.validation.quantity import quantity
 
 NODES = 5
-"""Moments of an open shutter at which a thing's pose is recorded; it goes straight on in between."""
+"""Moments of an open shutter at which a thing's pose is recorded; poses are interpolated in between."""
 
 AROUND = (-1.0, 0.0, 1.0)
 """Moments of the instants around one."""
@@ -57,7 +57,7 @@ RigAt = Callable[[int], Matrix4]
 
 
 FLOOR = Floor(height=0.0, is_fixed=True)
-"""The floor of all sequences: what moves may be above it or below."""
+"""The floor of all sequences: moving things may be above or below it."""
 
 
 def subjects(recipe: Recipe, specs: Sequence[ModelSpec]) -> tuple[str, ...]:
@@ -90,21 +90,21 @@ def blocks(context: SamplingContext) -> tuple[Block, ...]:
 
 
 def most_objects(recipe: Recipe) -> int:
-    """The model and its company, or most models in a scene."""
+    """The number of models: one and its company, or the most models in a scene."""
     if recipe.scenes is not None:
         return scenes_entry(recipe).most_objects
     return 1 + (recipe.scene.company.number if recipe.scene.company else 0)
 
 
 def cast(context: SamplingContext, subject: str, pose: int | None) -> tuple[ModelSpec, ...]:
-    """The recipe's models in a sequence; only the model itself where company is drawn for each sequence and none is named."""
+    """The recipe's models in a sequence; without a pose, the model alone if company is drawn for each sequence."""
     if context.recipe.scenes is not None:
         return scene_cast(context, subject)
     return context.with_company(subject, pose)
 
 
 def split(context: SamplingContext, subject: str, pose: int) -> str:
-    """The model's, the scene's or the sequence's, or what its pose, place or name draw."""
+    """The split of the model, the scene or the sequence, or one drawn from the pose, place or name."""
     by = context.recipe.splits.by
     if by == "sequence":
         return context.dealt_splits[context.sequence(subject, pose)]
@@ -114,7 +114,7 @@ def split(context: SamplingContext, subject: str, pose: int) -> str:
 
 
 def standing(context: SamplingContext, subject: str, box_of: BoxOf) -> Iterator[Standing]:
-    """The things as they are placed, seen by cameras that stand still; nothing where they are drawn for each sequence."""
+    """The things at their places, for still cameras; nothing if they are drawn for each sequence."""
     if not context.recipe.scene.is_moved_each_frame and is_still(context.recipe.viewpoints) and not _is_slow(context.recipe):
         things = placed_targets(context, subject, None, box_of)
         count, views = time_of(context).count, context.sequences_of(subject)
@@ -123,14 +123,14 @@ def standing(context: SamplingContext, subject: str, box_of: BoxOf) -> Iterator[
 
 
 def _is_slow(recipe: Recipe) -> bool:
-    """Return whether where things are placed is not asked before frames are rendered."""
+    """Return whether placing things is too slow to run before rendering."""
     company, scenes = recipe.scene.company, recipe.scenes
     layout = company.layout if company is not None else scenes.layout if isinstance(scenes, ScenesEntry) else None
     return layout is not None and is_slow(layout)
 
 
 def shot(context: SamplingContext, subject: str, poses: Sequence[int], box_of: BoxOf, key: str, first: int) -> Shot:
-    """Some instants of a sequence, and those that their labels need."""
+    """The shot of some instants of a sequence, with the instants that their labels need."""
     start = poses[0] - poses[0] % time_of(context).count
     taken = {pose - start for pose in poses}
     state = sequence_state(context, subject, start, box_of)
@@ -171,7 +171,7 @@ def _instant(context: SamplingContext, own: SequenceState, subject: str, pose: i
 
 
 def _needed(context: SamplingContext, taken: Set[int]) -> set[int]:
-    """The instants that labels of those that are taken need besides."""
+    """The further instants that the labels of the taken ones need."""
     names = {name for sensor in context.rig.sensors for name in sensor.kept(context.recipe.channels)}
     names.update(context.recipe.annotations)
     known = (label for name in names if (label := label_named(name)))
@@ -225,14 +225,14 @@ def _exposure(state: SequenceState, at: int, time: TimeEntry, rig_at: RigAt) -> 
 
 
 def _thing(moving: Moving, at: int, time: TimeEntry) -> Sweep | None:
-    """A thing's poses while the shutter is open; of one whose file plays, those of the instants around, as its time steps."""
+    """A thing's poses while the shutter is open; for a playing animation, its poses and time steps at the instants around."""
     moments = AROUND if moving.plays_file else tuple(np.linspace(-0.5, 0.5, NODES) * time.shutter)
     motion = moving.around(at, moments)
     return None if motion.is_still else Sweep(moments=tuple(map(float, moments)), motion=motion)
 
 
 def _rig(at: int, count: int, rig_at: RigAt) -> Sweep | None:
-    """The rig's poses at the instants around one; before the first instant and after the last it goes on as it went."""
+    """The rig's poses at the instants around one; its motion is continued before the first instant and after the last."""
     if count == 1:
         return None
     now = rig_at(at)

@@ -17,7 +17,7 @@ FARTHEST = 1e6
 """Largest distance of a camera from its target, metres: ten times the largest model allowed."""
 
 FULLEST = 4.0
-"""Largest share of the picture that a model may be asked to fill: nearer cameras are inside of the boxes of most models."""
+"""Largest share of the picture that a model may fill: nearer cameras are inside the boxes of most models."""
 
 DISTANCE = "from the target to the camera, metres"
 FILL = (
@@ -34,7 +34,7 @@ def in_elevation(low: float, high: float) -> None:
 
 
 def in_reach(low: float, high: float) -> None:
-    """Raise ValueError for distances, metres, that are none or too large."""
+    """Raise ValueError for distances, metres, that are not positive or too large."""
     if low <= 0:
         raise ValueError(f"expected distances above 0 m; found {low:g}")
     if high > FARTHEST:
@@ -42,13 +42,13 @@ def in_reach(low: float, high: float) -> None:
 
 
 def in_picture(low: float, high: float) -> None:
-    """Raise ValueError for shares of a picture, to be filled, that are none or too large."""
+    """Raise ValueError for filled shares of a picture that are not positive or too large."""
     if low <= 0 or high > FULLEST:
         raise ValueError(f"expected a share above 0 and up to {FULLEST:g}; found {low if low <= 0 else high:g}")
 
 
 class Fill(Frozen):
-    """A distance by how much of the picture is filled at it: one share, or several of a grid."""
+    """A distance given by the filled share of the picture: one share, or several for a grid."""
 
     fill: Values = Field(description="larger of box width / picture width and box height / picture height")
 
@@ -60,7 +60,7 @@ class Fill(Frozen):
 
 
 class FillBetween(Frozen):
-    """A distance by how much of the picture is filled at it, drawn."""
+    """A random distance, given by a range of the filled share of the picture."""
 
     fill: Interval = Field(description="a number or [low, high] (uniform), as for a grid")
 
@@ -125,7 +125,7 @@ SHAKE = "under time: a hand that is not still: degrees and mm at most, nothing f
 
 
 class Aimed(Frozen):
-    """Base of the kinds of viewpoints that can stand still."""
+    """Base of the kinds of still viewpoints."""
 
     target: Annotated[
         Annotated[Literal["center", "follow"], Tag("text")] | Annotated[Point, Tag("list")], Discriminator(shape_of)

@@ -14,7 +14,7 @@ from viewsphere.validation.errors import error_at, explained, one_of
 
 
 def _read(value: Any) -> Any:
-    """The parameters as the model's class has them; a value that is no mapping, or names no model, unchanged."""
+    """The parameters as the model's class; unchanged if the value is not a mapping, or names no model."""
     entry = cast("Mapping[str, Any]", value)
     if not isinstance(value, Mapping) or not isinstance(entry.get("model"), str):
         return value

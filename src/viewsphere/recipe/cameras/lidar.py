@@ -18,9 +18,9 @@ from viewsphere.validation.errors import shown
 MOST_RAYS = 10_000_000
 MOST_COLUMNS = 65_535
 LONGEST = 1e12
-"""Columns that a message writes out in digits."""
+"""Largest number of columns that a message writes out in digits."""
 WHOLE = 1e-6
-"""Share of a column by which the columns may miss a whole number."""
+"""Largest deviation of the number of columns from a whole number."""
 
 Angle = Annotated[Number, Field(ge=-90, le=90)]
 Turn = Annotated[Number, Field(ge=-360, le=360)]
@@ -44,7 +44,7 @@ CurveField = Annotated[
 
 
 class LidarEntry(Frozen):
-    """The rays of a LiDAR, and how it measures along them; angles in its axes: x ahead, y left, z up."""
+    """The rays of a LiDAR, and its measurement along them; angles in its axes: x ahead, y left, z up."""
 
     rings: Count | None = Field(default=None, description="number of rings, spread evenly over `elevation`")
     elevation: Annotated[tuple[Angle, Angle], AfterValidator(_rising)] | None = Field(
@@ -113,7 +113,7 @@ class LidarEntry(Frozen):
 
     @property
     def intrinsics(self) -> Intrinsics:
-        """The rays, as a lens: a row a ring from the highest, a column an azimuth from the left."""
+        """The rays, as a lens: a row for each ring from the highest, a column for each azimuth from the left."""
         rings, width = self._rings, round((self.azimuth[1] - self.azimuth[0]) / self.azimuth_step)
         scan = lens_parameters("scan", elevations_deg=rings, turn_deg=-sum(self.azimuth) / 2 + 0.0)
         across = math.radians(self.azimuth[1] - self.azimuth[0])
@@ -131,7 +131,7 @@ class LidarEntry(Frozen):
         return tuple(high + (low - high) * i / (self.rings - 1) for i in range(self.rings))
 
     def measuring(self, seed: int) -> Lidar:
-        """The measuring device, with draws that follow from a seed."""
+        """The measurement settings, with draws seeded by `seed`."""
         return Lidar(
             range=self.range,
             reference_range=self.reference_range,

@@ -1,4 +1,4 @@
-"""The rig of a recipe: sensors that are mounted to one another, listed, made by a rule, or read from calibrations."""
+"""The rig of a recipe: sensors mounted to one another, which are listed, generated, or read from calibrations."""
 
 from __future__ import annotations
 
@@ -85,8 +85,8 @@ class SensorEntry(Frozen):
         return any(getattr(self, name, None) is not None for name in LENS_FIELDS)
 
     def lens(self, camera: CameraEntry) -> CameraEntry:
-        """Size and lens, the recipe's camera's as far as the sensor says nothing. Raises ValueError for a size beside a camera
-        whose lens is in pixels.
+        """Size and lens of the sensor; missing ones are those of the recipe's camera. Raises ValueError for a sensor's size
+        together with a camera whose lens is in pixels.
         """
         mine = {name: value for name in LENS_FIELDS if (value := getattr(self, name, None)) is not None}
         states = any(name in mine for name in OWN_LENSES)
@@ -107,7 +107,9 @@ class SensorEntry(Frozen):
 
 
 class SensorList(Frozen):
-    """Sensors by name. The first is the rig's origin: where it stands elsewhere, all are moved and turned with it there."""
+    """Sensors by name. The first is the rig's origin: if it has another pose, all sensors are moved and turned so that it is
+    there.
+    """
 
     kind: Literal["sensors"] = Field(default="sensors", description="a mapping of sensors by name")
     sensors: Annotated[dict[SensorName, SensorEntry], Field(min_length=1, max_length=MOST_SENSORS)] = Field(
@@ -132,14 +134,14 @@ class SensorList(Frozen):
 
 
 class StereoRig(Frozen):
-    """Two equal cameras side by side, rectified: `left`, whose the viewpoint is, and `right`."""
+    """Two equal cameras side by side, rectified: `left`, which has the viewpoint, and `right`."""
 
     kind: Literal["stereo"] = Field(description="two equal cameras, left and right, side by side")
     baseline: Length = Field(description="metres from the left camera to the right one")
 
 
 class SurroundRig(Frozen):
-    """Equal cameras that look all around: `camera0` ahead, each next one turned on to the right."""
+    """Equal cameras that cover all directions: `camera0` ahead, each next one turned further to the right."""
 
     kind: Literal["surround"] = Field(description="equal cameras all around: camera0 ahead, camera1 turned to the right, ...")
     count: Annotated[Count, Field(ge=2, le=MOST_SENSORS)] = Field(description="number of cameras")
@@ -147,7 +149,7 @@ class SurroundRig(Frozen):
 
 
 class RigFile(Frozen):
-    """Sensors of calibration files. What the calibrations do not say, as sizes may be, is the recipe's camera's."""
+    """Sensors of calibration files. Missing values, such as sizes, are those of the recipe's camera."""
 
     kind: Literal["file"] = Field(default="file", description="from calibrations")
     path: Annotated[tuple[Annotated[str, Field(min_length=1)], ...], Field(min_length=1)] = Field(

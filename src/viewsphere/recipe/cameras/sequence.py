@@ -1,4 +1,4 @@
-"""The time of a recipe whose worlds are sequences."""
+"""The `time` of a recipe, which makes sequences."""
 
 from __future__ import annotations
 

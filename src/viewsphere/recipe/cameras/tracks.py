@@ -11,7 +11,7 @@ from viewsphere.model.fields.numbers import Count, Natural
 from viewsphere.recipe.values import shape_of
 
 MOST_POINTS = 2_000_000
-"""Points that one sensor follows through one sequence, at most."""
+"""Largest number of points that one sensor follows through one sequence."""
 
 At = Annotated[
     Annotated[tuple[Natural, ...], Field(min_length=1), Tag("list")] | Annotated[Literal["each"], Tag("text")],

@@ -1,4 +1,4 @@
-"""Fields of viewpoints that are motions of the camera over time; without `time` in the recipe they are refused.
+"""Fields of viewpoints that are motions of the camera over time; recipes without `time` refuse them.
 
 World axes: metres, z up. Headings are counter-clockwise from above: at 0 the camera looks along +Y, as at azimuth 0.
 """
@@ -39,7 +39,7 @@ Drift = Annotated[
         custom_error_message="expected a number or [from, to]",
     ),
 ]
-"""A number that stays, or the numbers at the sequence's first and last instant; even in between."""
+"""A constant number, or the numbers at the sequence's first and last instant, with linear interpolation."""
 
 
 def ends(drift: float | tuple[float, float]) -> tuple[float, float]:

@@ -97,7 +97,7 @@ class _Axes(Aimed):
 
     @property
     def distances(self) -> AxisValues:
-        """The distances, or the shares of the picture that stand for them."""
+        """The distances, or the filled shares that replace them."""
         return self.distance.fill if isinstance(self.distance, Fill) else self.distance
 
     @property
@@ -142,11 +142,11 @@ Shared = Annotated[
         description="true: one draw for all models or random scenes; by default each has its own",
     ),
 ]
-"""True if random viewpoints are drawn once for all."""
+"""Whether random viewpoints are drawn once for all subjects."""
 
 
 class Jitter(_Axes):
-    """A grid whose every viewpoint is moved at random, uniformly within plus or minus a width, not beyond the poles."""
+    """A grid with every viewpoint moved at random, uniformly within plus or minus a width, not beyond the poles."""
 
     kind: Literal["jitter"] = Field(description="a grid with random offsets")
     plus_minus: Spread = Field(description="the widest offset of each coordinate")
@@ -212,8 +212,8 @@ class Normal(Aimed):
 class PoseList(Aimed, OmitNone):
     """Viewpoints from a file: orbits around the target, or a camera's motion through the file's own world.
 
-    A motion is turned so that the file's `up` is +Z and its `forward` is -Y, moved so that `origin` lies where the models
-    stand, and scaled; its cameras look where they looked, whatever the target.
+    A motion is turned so that the file's `up` is +Z and its `forward` is -Y, moved so that `origin` is at the models, and
+    scaled; its cameras keep their viewing directions, regardless of the target.
     """
 
     OMIT_IF_NONE = ("fps",)
@@ -269,4 +269,4 @@ class PoseList(Aimed, OmitNone):
 _STILL = {"grid": Grid, "sphere": Sphere, "normal": Normal, "jitter": Jitter, "file": PoseList}
 
 Viewpoints = Annotated[Grid | Sphere | Normal | Jitter | PoseList | Moving, ByKind(TrajectorySpec, "grid", _STILL)]
-"""Places of the camera, or its motion: a trajectory."""
+"""Still viewpoints of the camera, or its motion: a trajectory."""

@@ -1,4 +1,4 @@
-"""Lamps of a recipe's scene: one file a kind, named as in recipes. The names below are those that your own kinds need."""
+"""Lamps of a recipe's scene: one file a kind, named as in recipes. The names below are for your own kinds."""
 
 from __future__ import annotations
 

@@ -40,7 +40,7 @@ PATHS: tuple[tuple[str, ...], ...] = (
 """Fields that hold a path; a path is relative to the file in which it is written."""
 
 WORDS = {"file", "daylight"}
-"""Values of these fields that are neither paths nor names of a source."""
+"""Values of these fields that are neither paths nor source names."""
 
 UNIONS: dict[str, tuple[frozenset[str], ...]] = {
     "sky": tuple(map(frozenset, (["hdri"], ["daylight"], ["night"], ["zenith", "horizon"]))),
@@ -48,7 +48,7 @@ UNIONS: dict[str, tuple[frozenset[str], ...]] = {
     "ground": (frozenset({"material"}), frozenset(pictures_of(Ground))),
     "rig": tuple(map(frozenset, (["sensors"], ["file", "path"], ["baseline"], ["count", "radius"]))),
 }
-"""Fields that are one of several kinds, and the fields that only one kind has."""
+"""Fields with several kinds, and the fields that only one kind has."""
 
 _STEP = re.compile(r"(?:^|\.)([A-Za-z_][\w-]*)|\[(\d+)\]")
 
@@ -76,7 +76,9 @@ def assemble(path: Path, changes: Mapping[str, Any] | None = None) -> tuple[dict
 
 
 def parse_change(text: str, option: str = "--set", example: str = "viewpoints.elevation=[10,20]") -> tuple[str, Any]:
-    """Field and value of `viewpoints.elevation=[10, 20]`; the value is YAML. Raises RecipeError for anything else."""
+    """The field and the value in a text such as `viewpoints.elevation=[10, 20]`; the value is YAML. Raises RecipeError for
+    anything else.
+    """
     name, equals, value = text.partition("=")
     if not equals:
         raise RecipeError(f"{option} {text}: expected field=value, such as {example}; found no '='")
@@ -117,7 +119,7 @@ def _joined(path: Path, above: tuple[Path, ...], known: dict[str, _Layer]) -> _L
 
 
 def _from(folder: Path, other: Path) -> str:
-    """The way from a folder to another one; all of its path where there is none, as between two drives of Windows."""
+    """The relative path from a folder to another one; an absolute path if there is none, as between two drives of Windows."""
     try:
         return os.path.relpath(other, folder)
     except ValueError:
@@ -157,7 +159,7 @@ def _of_other_kind(field: str, old: Any, new: Any) -> bool:
 
 
 def _kind_of(field: str, entry: Any) -> str | None:
-    """The kind of a rig that its fields say."""
+    """The kind of a rig, judging by its fields."""
     if field != "rig":
         return None
     kinds = {"sensors": "sensors", "file": "file", "path": "file"}

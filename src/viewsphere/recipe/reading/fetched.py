@@ -1,7 +1,7 @@
-"""Recipes at URLs, which are copied to this machine with all that lies beside them.
+"""Recipes at URLs, which are copied to this machine with all files beside them.
 
-A copy lies in the user's cache, in a folder whose name follows from the URL: data sets say where their models came from, and
-so the same recipe makes the same bytes, whichever process fetched it. Data sets that lie below are not copied.
+A copy is in the user's cache, in a folder named after the URL. Data sets record the paths of their models, so that the same
+recipe makes the same bytes in any process. Data sets below the recipe's folder are not copied.
 """
 
 from __future__ import annotations
@@ -26,8 +26,8 @@ PLAN = "store/plan.json"
 def fetched(path: str | os.PathLike[str]) -> Path:
     """A recipe's file on this machine: itself, or a copy of one at a URL, beside copies of all files in its folder and below.
 
-    Raises RecipeError where there is no such file, where MAX_FETCHED_BYTES are not enough, or where the cache cannot be
-    written; RemoteError where the URL does not answer, or refuses.
+    Raises RecipeError if the file is missing, if MAX_FETCHED_BYTES are exceeded, or if the cache cannot be written; RemoteError
+    if the URL does not answer, or refuses.
     """
     file = located(path)
     if not isinstance(file, RemotePath):
@@ -50,8 +50,8 @@ def fetched(path: str | os.PathLike[str]) -> Path:
 
 
 def _download(folder: RemotePath, copy: Path) -> None:
-    """Copy all files of a folder and below, but for data sets; not one where they are known to be too large together, and never
-    more than may be copied: not all file systems know sizes.
+    """Copy all files in a folder and below, except data sets. Copies nothing if the total size is known to exceed the limit,
+    and stops at the limit otherwise: not all file systems report sizes.
     """
     files = folder.sizes_below()
     suffixes = tuple(file.removesuffix(PLAN) or "store/" for file in files if f"/{file}".endswith(f"/{PLAN}"))
@@ -71,7 +71,7 @@ def _download(folder: RemotePath, copy: Path) -> None:
 
 
 def _replace(target: Path, own: Path) -> None:
-    """Put what was copied aside in its place, unless the same is there: another process may be reading that."""
+    """Move the copy into place, unless an equal copy is there, which another process may be reading."""
     if target.is_dir() and _digests(target) == _digests(own / "new"):
         return
     with suppress(FileNotFoundError):

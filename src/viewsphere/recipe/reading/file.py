@@ -19,7 +19,7 @@ from viewsphere.validation.errors import Marks, Place, dotted, shown
 from viewsphere.validation.errors import Path as Steps
 
 DEEPEST = 200
-"""Brackets within one another: each takes the YAML reader as long as all those around it."""
+"""Largest nesting of brackets: the YAML reader's time for each level equals that of all levels around it."""
 
 FOUND: dict[type | tuple[type, ...], str] = {type(None): "an empty file", list: "a list", str: "a text", object: "a number"}
 """The problem of a file that holds no mapping. The message does not quote the file, which may be private and no recipe."""
@@ -58,7 +58,7 @@ class _Loader(ShallowLoader):
         self._left = self.most
 
     def compose_node(self, parent: Node | None, index: Any) -> Node | None:
-        """The next node; raises _TooMany where it is a value beyond the limit. The keys of mappings are no values."""
+        """The next node; raises _TooMany for a value beyond the limit. Keys of mappings do not count as values."""
         if parent is None or index is not None:
             self._left -= 1
             if self._left < 0:
@@ -82,8 +82,8 @@ _use_yaml_12(_Dumper)
 
 
 def read(path: Path, fields: str = "name, models, viewpoints") -> tuple[Any, Marks]:
-    """Plain data of one recipe file, or of another with these fields, and the place of every value in it; raises RecipeError
-    naming file and line.
+    """Plain data of one recipe file, or of another file with these fields, and the place of every value; raises RecipeError
+    with file and line.
     """
     data, marks = parse(_text(path), str(path))
     if not isinstance(data, dict):

@@ -13,7 +13,7 @@ _PRESENT = {"azimuth_deg": "azimuth", "elevation_deg": "elevation", "tilt_deg": 
 """Former names, with those that replaced them."""
 
 _ENTRIES = frozenset({"sun", "night", "at", "jitter"})
-"""Entries of a scene that had fields with these names. A third-party plug-in's options may have them still."""
+"""Entries of a scene that had fields with these names. Options of third-party plug-ins may still have them."""
 
 _SCENES = frozenset({"scene", "variations"})
 
@@ -30,7 +30,9 @@ def present(path: Path) -> Path:
 
 
 def with_present_names(data: Any, path: Path = ()) -> Any:
-    """The data of a recipe with present names for former ones. A former name beside its present one stays, as a mistake."""
+    """The data of a recipe with present names for former ones. A former name next to its present one remains, and causes an
+    error.
+    """
     if isinstance(data, Mapping) and (len(path) != 1 or path[0] in _SCENES):
         fields = cast(Mapping[Any, Any], data)
         return {

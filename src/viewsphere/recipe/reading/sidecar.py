@@ -17,7 +17,7 @@ from viewsphere.recipe.reading.file import read
 from viewsphere.validation.errors import report, shown
 
 ENDING = ".viewsphere.yaml"
-"""Follows the whole name of the model's file."""
+"""Suffix after the full name of the model's file."""
 
 
 def _all_of_them(symmetries: Symmetries | None) -> Symmetries | None:
@@ -31,7 +31,7 @@ def _all_of_them(symmetries: Symmetries | None) -> Symmetries | None:
 
 
 class Sidecar(Frozen):
-    """Symmetries, named points and parts of the body of a model, and words for what it looks like."""
+    """Symmetries, named points and body parts of a model, and words for its appearance."""
 
     axes: Literal["file", "object"] = Field(
         default="file",
@@ -61,7 +61,7 @@ class Sidecar(Frozen):
 
 
 def read_sidecar(path: Path) -> Sidecar:
-    """The sidecar in a file; raises RecipeError in a line a mistake, which names file, line and field."""
+    """The sidecar in a file; raises RecipeError, one line per error, with file, line and field."""
     data, marks = read(path, "axes, symmetries, keypoints, body_parts, color, material")
     try:
         return Sidecar.model_validate(data)

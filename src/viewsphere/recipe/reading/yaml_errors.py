@@ -10,7 +10,7 @@ from yaml.tokens import FlowMappingEndToken, FlowMappingStartToken, FlowSequence
 from viewsphere.validation.errors import shown
 
 UNCLOSED = ("while scanning a quoted scalar", "while parsing a flow sequence", "while parsing a flow mapping")
-"""The YAML reader's contexts of a quote or a bracket that is not closed, and whose place it knows."""
+"""The YAML reader's contexts of an unclosed quote or bracket with a known place."""
 
 OPENING: dict[str, str] = {"'": "quoted text", '"': "quoted text", "[": "list", "{": "mapping"}
 """The kind of value that each opening sign begins."""
@@ -19,7 +19,7 @@ ENDS = ("end of stream", "<stream end>")
 """The YAML reader's words for the end of a file."""
 
 NEEDS_QUOTES = re.compile(r"[*&!%@`|>][^,#\]}]*")
-"""A value that begins with a character to which YAML gives a meaning of its own, such as `*.obj`."""
+"""A value that begins with a character that is special in YAML, such as `*.obj`."""
 
 EXPLAINED = {
     "undefined alias": None,

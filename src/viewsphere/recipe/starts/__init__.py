@@ -1,4 +1,6 @@
-"""The files that `viewsphere new` writes: a folder a kind, named after it, with a commented recipe and perhaps a script."""
+"""The files that `viewsphere new` writes: a folder for each kind, named after it, with a commented recipe and possibly a
+script.
+"""
 
 from __future__ import annotations
 
@@ -10,10 +12,10 @@ from typing import NamedTuple
 from viewsphere.validation.quantity import quantity
 
 FIRST = "poses"
-"""The kind that is written where none is named."""
+"""The default kind."""
 
 FEWEST = 6
-"""Models that fill the scenes of a recipe to start from, and its splits by model; fewer stand in a scene more than once."""
+"""Number of models that fill the scenes and the splits by model of a starting recipe; fewer models repeat within a scene."""
 
 REPEAT = "  repeat: true                 # a model may stand in a scene more than once"
 
@@ -34,7 +36,7 @@ def start(kind: str) -> dict[str, str]:
 
 
 class FoundFiles(NamedTuple):
-    """Model files of one kind in one folder: a pattern that names them, how many there are, and what to call them."""
+    """Model files of one kind in one folder: a pattern that matches them, their number, and their category."""
 
     pattern: str
     number: int
@@ -42,7 +44,7 @@ class FoundFiles(NamedTuple):
 
 
 def with_models(text: str, name: str, found: Sequence[FoundFiles]) -> str:
-    """The text of a recipe to start from, named `name`, of these files instead of the zoo's models."""
+    """The text of a starting recipe, named `name`, with these files instead of the zoo's models."""
     entries = "".join(
         f"  - source: {_quoted(one.pattern)}    # {quantity(one.number, 'file')}\n    category: {_quoted(one.category)}\n"
         for one in found

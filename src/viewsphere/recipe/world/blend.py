@@ -1,4 +1,4 @@
-"""A .blend file that is the scene around the targets of a recipe: which of its objects are labelled, and which are shown."""
+"""A .blend file as the scene around the targets of a recipe, with its labelled and shown objects."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class LabelRule(Frozen):
 
 
 class VariantEntry(Frozen):
-    """Objects of the file of which one is shown, with what is parented to it."""
+    """Objects of the file of which one is shown, with its children."""
 
     one_of: Pattern = Field(description="pattern of the objects' names, such as plane*")
     draw: Draw = Field(default="per_frame", description=f"which one: {DRAWS}")
@@ -59,7 +59,7 @@ VariantField = Annotated[VariantEntry, BeforeValidator(_variant), OrShort({"type
 
 
 class BlendEntry(Frozen):
-    """A .blend file whose scene is rendered as it is, by an engine that opens such files (cycles, eevee, workbench)."""
+    """A .blend file whose scene is rendered unchanged, by an engine that opens such files (cycles, eevee, workbench)."""
 
     file: str = Field(min_length=1, description="path of a .blend file")
     at: str | None = Field(

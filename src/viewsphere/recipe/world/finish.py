@@ -32,7 +32,7 @@ class PerFrame(Frozen):
 
 
 def once_a_sequence(entry: Entry) -> Entry:
-    """The entry, drawn once a sequence where it would be drawn for every frame and nobody asked for that."""
+    """The entry, drawn once a sequence if drawing for every frame is only its default."""
     is_asked = "draw" in entry.model_fields_set or getattr(entry, "draw", None) != "per_frame"
     return entry if is_asked else entry.model_copy(update={"draw": "per_sequence"})
 
@@ -94,7 +94,7 @@ Stops = Annotated[
 
 
 class ViewEntry(entry_of(ViewTransform), PerFrame):
-    """From light to a picture."""
+    """The conversion of light to a picture."""
 
     exposure: Stops = Field(  # pyright: ignore[reportIncompatibleVariableOverride]
         default="auto", description="stops: 1 is twice as bright; auto: 0, or in rooms a daylight exposure"

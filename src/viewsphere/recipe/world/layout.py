@@ -38,12 +38,14 @@ class LayoutEntry(Frozen):
 
     @property
     def options(self) -> dict[str, JsonValue]:
-        """Everything that is the placer's own."""
+        """The options of the placer."""
         return dict(self.__pydantic_extra__)
 
 
 def _renamed(value: Any) -> Any:
-    """`random` is an older word for `scatter`; the placer of listed spots is asked for by the list."""
+    """The placer's present name: `random` is a former name of `scatter`. The placer of listed spots is selected only by a
+    list.
+    """
     if value == "listed":
         raise ValueError("expected a placer, such as scatter or row, or a list of [x, y, azimuth]; found listed without spots")
     return "scatter" if value == "random" else value
@@ -63,7 +65,7 @@ Layout = Annotated[
 
 
 class SurfaceEntry(Frozen):
-    """A table top in the middle of the scene, which is drawn, with legs where it is high enough."""
+    """A visible table top in the middle of the scene, with legs if it is high enough."""
 
     size: tuple[Length, Length] = Field(description="[width along x, depth along y], metres")
     height: Length = Field(description="metres above the floor")

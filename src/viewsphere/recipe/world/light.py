@@ -53,7 +53,7 @@ ANGLES = ("azimuth", "elevation")
 
 
 class SunEntry(entry_of(Sun, optional=ANGLES)):
-    """The sun: where it stands, by angles or by date, time and place, and how it shines."""
+    """The sun: its position, by angles or by date, time and place, and its light."""
 
     date: Drawn[Day] | None = Field(default=None, description="or from a date, '2026-06-21'; north is +Y")
     time: Drawn[Hours] | None = Field(
@@ -94,17 +94,17 @@ class GradientEntry(entry_of(Sky, without=("kind",))):
 
 
 class DaylightEntry(entry_of(Daylight, without=("kind",))):
-    """The sky that the sun's place makes."""
+    """A sky that follows from the sun's position."""
 
 
 class DaylightSky(Frozen):
-    """A sky made by the sun's place."""
+    """A sky that follows from the sun's position."""
 
     daylight: DaylightEntry = Field(description="sky computed from the sun's position: turbidity, clouds, strength")
 
 
 class NightEntry(Frozen):
-    """A sky without the sun, as a long exposure shows it."""
+    """A sky without the sun, as seen in a long exposure."""
 
     moon: Drawn[Strength] = Field(default=0.1, description="irradiance on a surface that faces the moon, in the sky's units")
     azimuth: Drawn[Number] = Field(default=-60.0, description="azimuth of the moon, degrees, as for cameras")

@@ -45,12 +45,12 @@ class MotionEntry(Frozen):
 
     @property
     def options(self) -> dict[str, JsonValue]:
-        """Everything that is the kind's own."""
+        """The options of the kind."""
         return dict(self.__pydantic_extra__)
 
 
 Motions = MotionEntry | tuple[MotionEntry, ...]
-"""One motion, or several, of which each moves what the ones before it moved."""
+"""One motion, or several, each applied to the result of the previous ones."""
 
 MotionsField = Annotated[
     Annotated[MotionEntry, Tag("mapping")] | Annotated[tuple[MotionEntry, ...], Field(min_length=1), Tag("list")],

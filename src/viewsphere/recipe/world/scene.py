@@ -49,7 +49,7 @@ from viewsphere.validation.errors import error_at, shown, told_of
 
 LARGEST_IMAGE = 16384
 OF_FILE = ("place", "sun", "sky", "ground")
-"""Fields that a recipe with a .blend scene must not have: the file brings them."""
+"""Fields that a recipe with a .blend scene must not have, because the file defines them."""
 LENSES = ("fov_deg", "focal_px", "focal_mm", "K", "of_viewpoints")
 
 Row = tuple[Number, Number, Number]
@@ -75,7 +75,7 @@ CameraMatrix = Annotated[tuple[Row, Row, Row], AfterValidator(_of_pinhole)]
 
 
 def _focal(value: Any) -> Any:
-    """A number as two equal ones."""
+    """A single number as two equal ones."""
     return pair(value) if isinstance(value, (int, float)) and not isinstance(value, bool) else value
 
 
@@ -180,7 +180,7 @@ class CameraEntry(Frozen):
 
 
 class SceneEntry(Frozen):
-    """Light, ground and background, and what stands around the targets. All of it may be drawn."""
+    """Light, ground, background, and the surroundings of the targets. All values may be random."""
 
     draw: Draw = Field(
         default="per_model",
@@ -284,7 +284,7 @@ class SceneEntry(Frozen):
 
     @property
     def automatic_ground(self) -> Literal["on", "off", "catcher"]:
-        """The ground that `ground: auto` stands for in this scene."""
+        """The ground that `ground: auto` selects in this scene."""
         if self.blend is not None:
             return "off"
         if any(entry.environment for entry in self.backgrounds):
@@ -308,7 +308,7 @@ class SceneEntry(Frozen):
 
     @property
     def is_composed(self) -> bool:
-        """True if the scene holds more than a model and the ground: then everything stands on world z = 0."""
+        """True if the scene has more than a model and the ground; everything then stands on world z = 0."""
         return bool(self.place or self.blend or self.company or self.planes)
 
     @property
@@ -347,11 +347,11 @@ class SceneEntry(Frozen):
 
     @property
     def flickering(self) -> Iterator[str]:
-        """Fields of what is drawn for every frame, which beside time has to be written."""
+        """The fields with draws for every frame; in recipes with `time`, such draws must be requested explicitly."""
         return (name for name, part in self if isinstance(part, PerFrame) and part.draw == "per_frame")
 
     def check_still(self) -> None:
-        """Raise ValueError where something is drawn once a sequence, which only a recipe with `time` has."""
+        """Raise ValueError for draws once a sequence, because only recipes with `time` have sequences."""
         parts = ((name, part) for name, part in self if isinstance(part, PerFrame))
         for name, entry in (("", self), *parts, *self._around):
             if entry.draw == "per_sequence":

@@ -29,7 +29,7 @@ OF_FILES = ("origin", "up", "forward", "unit", "category")
 
 
 class PlaceEntry(OmitNone):
-    """The place in which the targets stand."""
+    """The place around the targets."""
 
     OMIT_IF_NONE = ("parked", "walkers", "motion")
 
@@ -106,7 +106,7 @@ class PlaceEntry(OmitNone):
 
 
 class CompanyEntry(OmitNone):
-    """Other models of the recipe, of the same split, beside the one each frame is about."""
+    """Other models of the recipe, of the same split, next to the model of each frame."""
 
     OMIT_IF_NONE = ("motion",)
 
@@ -130,7 +130,7 @@ class CompanyEntry(OmitNone):
 
     @property
     def number(self) -> int:
-        """Number of distractors, the most where it is drawn."""
+        """Number of distractors; if it is random, the largest."""
         return int(span(self.count)[1]) if self.count is not None else len(self.spots)
 
     @property
@@ -140,7 +140,7 @@ class CompanyEntry(OmitNone):
 
     @property
     def spots(self) -> tuple[Spot, ...]:
-        """The listed spots of the distractors; empty where a placer chooses them."""
+        """The listed spots of the distractors; empty if a placer chooses them."""
         return spots_of(self.layout)
 
 
@@ -187,7 +187,7 @@ class PlaneEntry(Frozen):
 
     @property
     def most(self) -> int:
-        """Most planes there are at once."""
+        """Largest number of planes at once."""
         return int(span(self.count)[1])
 
 

@@ -14,7 +14,7 @@ from viewsphere.recipe.world.layout import LAYOUT, ON, ORIENTATION, Layout, OnFi
 
 
 class ScenesEntry(Frozen):
-    """Random scenes: in each some of the recipe's models are drawn and placed, none of them more than another."""
+    """Random scenes, each with some of the recipe's models in random places, none of them the main subject."""
 
     sampler: Literal["scenes"] = Field(default="scenes", description="scenes, or another sampler, beside its options")
     count: Count = Field(description="number of scenes")

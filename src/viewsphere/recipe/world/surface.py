@@ -1,4 +1,4 @@
-"""The ground that a recipe's targets stand on, and changes to their materials."""
+"""The ground under a recipe's targets, and changes to their materials."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from viewsphere.recipe.values import COLOR_FORMS, OrShort, parse_color, shape_of
 from viewsphere.validation.errors import one_of
 
 ANY = "any"
-"""Stands for all materials."""
+"""The name that means all materials."""
 
 
 def _known(name: str) -> str:
@@ -36,7 +36,7 @@ def _known(name: str) -> str:
 
 
 def _choice(value: Any) -> Any:
-    """A list of materials, or any, as a choice between them; any among others stands for each."""
+    """A list of materials, or `any`, as a choice between them; `any` in a list means all materials."""
     if isinstance(value, Mapping) and "choice" in value:
         given = cast(Mapping[str, Any], value)
         if "weights" in given and ANY in (names := given["choice"]):
@@ -61,7 +61,7 @@ MaterialNames = Annotated[
     BeforeValidator(_choice),
     OrShort({"type": "array", "items": {"type": "string"}, "minItems": 1}),
 ]
-"""The name of a material, or several, or any, to draw one from."""
+"""The name of a material, or several names or `any` for a random one."""
 
 
 class GroundEntry(entry_of(Ground, optional=("color",), fixed=("catcher", "labels")), OmitNone):
@@ -107,7 +107,7 @@ GroundField = Annotated[
 
 
 class MaterialEntry(entry_of(Repaint, fixed=("material",)), OmitNone):
-    """A change to materials of the models; where several fit one, the last counts."""
+    """A change to materials of the models; if several match a material, the last one applies."""
 
     OMIT_IF_NONE = ("image", "images", "texture")
 

@@ -1,4 +1,4 @@
-"""The weather of a recipe's scene: fog, rain, snow that falls, and wet ground. Its numbers may be drawn."""
+"""The weather of a recipe's scene: fog, rain, falling snow, and wet ground. Its numbers may be random."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from viewsphere.recipe.values import OrShort, shape_of, switch
 from viewsphere.validation.errors import error_at, nearest
 
 HEAVY = {"rain": 7.6, "snow": 2.5}
-"""Millimetres of water an hour from which on meteorologists call rain, and snow, heavy."""
+"""Millimetres of water an hour above which meteorologists call rain, and snow, heavy."""
 
 
 class FogEntry(entry_of(Fog)):
@@ -36,23 +36,23 @@ class _FallingEntry(Frozen):
 
 
 class RainEntry(entry_of(Rain, without=("seed",)), _FallingEntry):  # pyright: ignore[reportIncompatibleVariableOverride]
-    """Rain that falls, under a sky that it covers, onto what it wets."""
+    """Falling rain, with an overcast sky and wet surfaces."""
 
 
 class SnowEntry(entry_of(Snow, without=("seed",)), _FallingEntry):  # pyright: ignore[reportIncompatibleVariableOverride]
-    """Snow that falls, under a sky that it covers."""
+    """Falling snow, with an overcast sky."""
 
 
 class WetEntry(entry_of(Wet, without=("seed",))):
-    """Water on what faces up; rain brings it by itself."""
+    """Water on surfaces that face up; rain adds it by default."""
 
 
 class LampsEntry(entry_of(Lamps)):
-    """Lamps of a place that are lit."""
+    """Lit lamps of a place."""
 
 
 def _short(name: str, words: tuple[str, ...]) -> BeforeValidator:
-    """A number, or a range of numbers, as a mapping of the field that matters most."""
+    """A number, or a range of numbers, as a mapping with the most important field."""
 
     def read(value: Any) -> Any:
         if value is False:
@@ -87,7 +87,7 @@ LampsField = Annotated[
 
 
 def check_weather(rain: object, snow: object) -> None:
-    """Raise ValueError for rain and snow that are both heavy, which no air is warm and cold enough for."""
+    """Raise ValueError for rain and snow that are both heavy, which does not occur at any temperature."""
     if isinstance(rain, RainEntry) and isinstance(snow, SnowEntry):
         least = {"rain": span(rain.rate)[0], "snow": span(snow.rate)[0]}
         if all(least[name] >= HEAVY[name] for name in HEAVY):

@@ -20,65 +20,59 @@ class Place(Protocol):
     """Writes a data set below its root."""
 
     def make(self) -> None:
-        """See that it can be written, and clear what dead runs left; raises StoreError if it cannot."""
+        """Check that the root can be written, and remove the remains of dead runs; raises StoreError if it cannot."""
         ...
 
     def is_foreign(self) -> bool:
-        """Return whether there are files which no store has, though nothing tells of a store."""
+        """Return whether the root has files but no sign of a store."""
         ...
 
     def is_begun(self) -> bool:
-        """Return whether any shot is there, or another run is at work."""
+        """Return whether any shot exists, or another run is active."""
         ...
 
     def is_shared(self) -> bool:
-        """Return whether other processes find there what this one writes."""
+        """Return whether other processes can read the results of this one."""
         ...
 
     def others_at_work(self) -> bool:
-        """Return whether another run is at work; False where nothing is known of others."""
+        """Return whether another run is active; False if other runs cannot be detected."""
         ...
 
     def occupied(self) -> AbstractContextManager[Path]:
-        """Show other runs that this one is at work, by a folder of this machine that is aside as long as the block lasts; then
-        what workers left that died goes, too.
+        """Show other runs that this one is active, by a scratch folder of this machine during the block. Its end also removes
+        the remains of dead workers.
         """
         ...
 
     def locked(self) -> AbstractContextManager[None]:
-        """Nobody else changes what runs have in common as long as the block lasts, where that can be known. Blocks may be
-        nested.
-        """
+        """Keep other runs from changing shared files during the block, where the place supports that. Blocks may be nested."""
         ...
 
     def scratch_folder(self) -> AbstractContextManager[Path]:
-        """A folder of this machine for what is not whole yet, as long as the block lasts; StoreError for what the disk refuses
-        meanwhile.
-        """
+        """A folder of this machine for incomplete results during the block; errors of the disk become StoreError."""
         ...
 
     def put(self, made: Path, target: Path) -> None:
-        """Put a file or folder that lies aside in its place. A file takes the place of another; where another writer finished
-        the same folder first, that one stays.
+        """Move a file or folder from a scratch folder to its place. A file replaces another; if another writer finished the
+        same folder first, that folder stays.
         """
         ...
 
     def replace(self, made: Path, target: Path) -> None:
-        """Put a folder that lies aside in the place of another one."""
+        """Replace a folder by one from a scratch folder."""
         ...
 
     def remove(self, folder: Path) -> None:
-        """Remove a folder of the data set with all that is in it, as far as that is possible."""
+        """Remove a folder of the data set with its content, as far as possible."""
         ...
 
     def finished(self) -> Iterator[str]:
-        """Keys of all shots whose manifest is there, in no order."""
+        """Keys of all shots with a manifest, in no order."""
         ...
 
     def new(self) -> AbstractContextManager[Path]:
-        """A folder to write into that becomes the root itself when the block ends well; raises StoreError where files lie
-        there.
-        """
+        """A folder to write into that becomes the root itself if the block succeeds; StoreError if the root has files."""
         ...
 
 

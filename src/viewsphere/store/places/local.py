@@ -1,4 +1,4 @@
-"""A data set on a disk: folders are made aside, and renamed when they are whole."""
+"""A data set on a disk: folders are made in a scratch folder, and renamed when they are complete."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ NEW, OLD = "new", "old"
 """Scratch folders: NEW for results in progress; OLD, by paths in the data set, for the folders that they replace."""
 
 LOCK_S = 600
-"""Seconds that a run waits for others who change what runs have in common, which takes them moments."""
+"""Seconds that a run waits while others change shared files, which takes them moments."""
 
 NO_LOCKS = {errno.ENOLCK, errno.ENOSYS, errno.ENOTSUP, errno.EOPNOTSUPP}
 """Errors of file systems without locks."""
@@ -44,7 +44,7 @@ class Local:
         return self._store / "writing"
 
     def make(self) -> None:
-        """As `Place` says."""
+        """See `Place`."""
         try:
             self._writing.mkdir(parents=True, exist_ok=True)
         except OSError as error:
@@ -55,25 +55,25 @@ class Local:
             self._sweep()
 
     def is_foreign(self) -> bool:
-        """As `Place` says."""
+        """See `Place`."""
         return self.root.is_dir() and any(self.root.iterdir()) and not self._writing.is_dir()
 
     def is_begun(self) -> bool:
-        """As `Place` says."""
+        """See `Place`."""
         return any(self._writing.iterdir()) or any((self._store / "shots").glob("*/*"))
 
     def is_shared(self) -> bool:
-        """As `Place` says."""
+        """See `Place`."""
         return True
 
     def others_at_work(self) -> bool:
-        """As `Place` says."""
+        """See `Place`."""
         this_process = of_this_process()
         return any(not path.name.startswith(this_process) for path in self._writing.iterdir())
 
     @contextmanager
     def occupied(self) -> Generator[Path]:
-        """As `Place` says."""
+        """See `Place`."""
         with disk_errors(self.root):
             scratch = ScratchDir.make(self._writing)
         try:
@@ -85,7 +85,7 @@ class Local:
 
     @contextmanager
     def locked(self) -> Generator[None]:
-        """As `Place` says."""
+        """See `Place`."""
         from filelock import FileLock, Timeout
 
         lock = FileLock(self._store.absolute() / "lock", timeout=LOCK_S, is_singleton=True)
@@ -107,7 +107,7 @@ class Local:
 
     @contextmanager
     def scratch_folder(self) -> Generator[Path]:
-        """As `Place` says."""
+        """See `Place`."""
         with disk_errors(self.root):
             self._writing.mkdir(parents=True, exist_ok=True)
             scratch = ScratchDir.make(self._writing)
@@ -119,7 +119,7 @@ class Local:
             scratch.remove()
 
     def put(self, made: Path, target: Path) -> None:
-        """As `Place` says."""
+        """See `Place`."""
         target.parent.mkdir(parents=True, exist_ok=True)
         if made.is_file():
             move(made, target)
@@ -133,13 +133,14 @@ class Local:
                 raise
 
     def replace(self, made: Path, target: Path) -> None:
-        """As `Place` says. The old folder goes with what is aside; and so does what other runs put there at this moment. It is
-        never lost: where this ends between the two, `scratch_folder` puts it back; where the process dies, the next run.
+        """See `Place`. The old folder moves to the scratch folder and is removed with it, as is a folder that another run puts
+        there at this moment. The old folder is never lost: if this fails between the two moves, `scratch_folder` puts it back;
+        if the process dies, the next run does.
         """
         target.parent.mkdir(parents=True, exist_ok=True)
         old = made.parent / OLD / target.relative_to(self.root)
         old.parent.mkdir(parents=True)
-        write_through(made)  # what takes longest, and fails on a full disk, comes before the old leaves
+        write_through(made)  # the slowest step, which fails on a full disk, precedes the removal of the old folder
         for another in count():
             with suppress(FileNotFoundError):  # there is none, or another run has moved it
                 move(target, made.parent / f"{another}" if old.exists() else old)
@@ -151,23 +152,25 @@ class Local:
                     raise
 
     def remove(self, folder: Path) -> None:
-        """As `Place` says."""
+        """See `Place`."""
         shutil.rmtree(folder, ignore_errors=True)
 
     def finished(self) -> Iterator[str]:
-        """As `Place` says."""
+        """See `Place`."""
         with suppress(FileNotFoundError):
             for group in os.scandir(self._store / "shots"):
                 shots = os.scandir(group.path)
                 yield from (shot.name for shot in shots if os.path.exists(f"{shot.path}/{MANIFEST}"))  # noqa: PTH110
 
     def _sweep(self) -> None:
-        """Remove what dead writers left unfinished; what they were about to replace comes back."""
+        """Remove the unfinished results of dead writers, and put back the folders that they were about to replace."""
         for left in left_by_dead(self._writing):
             self._put_back(left)
 
     def _give_up(self, own: ScratchDir) -> None:
-        """Remove what came to nothing; where what it was about to replace cannot be put back now, the next sweep does it."""
+        """Remove an unfinished result, and put back the folder that it was about to replace; if that fails now, the next sweep
+        does it.
+        """
         is_back = False
         try:
             with suppress(OSError):
@@ -180,7 +183,7 @@ class Local:
                 own.leave()
 
     def _put_back(self, left: Path) -> None:
-        """Put back what was about to be replaced, where nothing has taken its place."""
+        """Put back the folders that were about to be replaced, if no others have taken their places."""
         for old in _replaced(left / OLD):
             target = self.root / old.relative_to(left / OLD)
             if not target.exists():
@@ -193,7 +196,7 @@ class Local:
 
     @contextmanager
     def new(self) -> Generator[Path]:
-        """As `Place` says."""
+        """See `Place`."""
         target = self.root
         place, prefix = target.parent, f"{target.name}~"
         missing = [parent for parent in target.parents if not parent.exists()]
@@ -219,7 +222,7 @@ class Local:
 
 
 def _replaced(old: Path) -> Iterator[Path]:
-    """The models, shots and exports that lie here by their paths in a data set; no links that lead elsewhere."""
+    """The models, shots and exports stored here under their paths in a data set, without links to other places."""
     exports = (path for path in old.glob("*") if path.name != "store")
     for path in chain(old.glob("store/models/*"), old.glob("store/shots/*/*"), exports):
         if path.resolve() == old.resolve() / path.relative_to(old):
@@ -228,7 +231,7 @@ def _replaced(old: Path) -> Iterator[Path]:
 
 @contextmanager
 def disk_errors(root: Path) -> Generator[None]:
-    """Say in one line what the disk refused; what is finished stays."""
+    """Turn disk errors into one-line StoreErrors; finished results stay."""
     try:
         yield
     except OSError as error:

@@ -1,4 +1,4 @@
-"""A data set at a URL: folders are made on this machine, and uploaded file by file when they are whole."""
+"""A data set at a URL: folders are made on this machine, and uploaded file by file when they are complete."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ from viewsphere.urls import files_below
 from viewsphere.urls.remote_path import RemotePath
 
 AT_ONCE = 16
-"""Files that are uploaded or asked for at once: storages answer many requests in the time of one."""
+"""Number of parallel uploads or requests: storages answer many requests in the time of one."""
 
 TELLING = (CHECKSUMS, MANIFEST, "model.json")
-"""Files that tell what lies in a folder, in the order in which they are uploaded, after all others; the last one of them that
-a folder has tells that it is whole.
+"""Files that describe a folder, in the order of their upload, after all other files. The last one that a folder has marks it as
+complete.
 """
 
 Item = TypeVar("Item")
@@ -37,40 +37,40 @@ class Remote:
     root: RemotePath
 
     def make(self) -> None:
-        """As `Place` says; whether it can be written shows when the first file is."""
+        """See `Place`; a missing permission shows only at the first upload."""
 
     def is_foreign(self) -> bool:
-        """As `Place` says."""
+        """See `Place`."""
         return any(self.root.glob("*"))
 
     def is_begun(self) -> bool:
-        """As `Place` says; of other runs nothing is known."""
+        """See `Place`; other runs cannot be detected."""
         return any(True for _ in self.finished())
 
     def is_shared(self) -> bool:
-        """As `Place` says."""
+        """See `Place`."""
         return self.root.is_shared
 
     def others_at_work(self) -> bool:
-        """As `Place` says; nothing is known of others."""
+        """See `Place`; nothing is known of others."""
         return False
 
     def occupied(self) -> AbstractContextManager[Path]:
-        """As `Place` says; others do not see it."""
+        """See `Place`; other runs cannot see it."""
         return temporary("run")
 
     def locked(self) -> AbstractContextManager[None]:
-        """As `Place` says; nothing is known of others."""
+        """See `Place`; nothing is known of others."""
         return nullcontext()
 
     @contextmanager
     def scratch_folder(self) -> Generator[Path]:
-        """As `Place` says."""
+        """See `Place`."""
         with disk_errors(self.root), temporary("aside") as scratch:
             yield scratch
 
     def put(self, made: Path, target: Path) -> None:
-        """As `Place` says."""
+        """See `Place`."""
         place = cast(RemotePath, target)
         if made.is_file():
             place.upload(made)
@@ -85,27 +85,27 @@ class Remote:
             (place / name).upload(made / name)
 
     def replace(self, made: Path, target: Path) -> None:
-        """As `Place` says. The old folder is absent from the first file on, and the new one is there with the last."""
+        """See `Place`. The old folder is absent from the first file on, and the new one is there with the last."""
         place = cast(RemotePath, target)
         for name in reversed(TELLING):
             (place / name).unlink()
         self.put(made, place)
 
     def remove(self, folder: Path) -> None:
-        """As `Place` says."""
+        """See `Place`."""
         place = cast(RemotePath, folder)
         for name in reversed(TELLING):
             (place / name).unlink()
         _each(lambda path: (place / path).unlink(), place.files_below())
 
     def finished(self) -> Iterator[str]:
-        """As `Place` says. Folders of shots are listed group by group, with all that is in them: a thousand files an answer."""
+        """See `Place`. Folders of shots are listed group by group, with their content: a thousand files per response."""
         groups = list((self.root / "store" / "shots").glob("*"))
         yield from chain.from_iterable(_each(_finished_of, groups))
 
     @contextmanager
     def new(self) -> Generator[Path]:
-        """As `Place` says."""
+        """See `Place`."""
         if self.is_foreign():
             raise StoreError(f"{self.root}: expected an empty or new folder, found other files: choose another, or delete it")
         with self.scratch_folder() as scratch:
@@ -116,7 +116,7 @@ class Remote:
 
 
 def _finished_of(group: RemotePath) -> list[str]:
-    """Keys of the shots of a group whose manifest is there."""
+    """Keys of the shots in a group that have a manifest."""
     parted = (path.partition("/") for path in group.files_below())
     return [key for key, _, file in parted if file == MANIFEST]
 

@@ -1,4 +1,4 @@
-"""Channels as files: the recipe chooses the kind of file, and every file's first bytes say which kind it is."""
+"""Channels as files: the recipe chooses the kind of file, and the first bytes of a file identify its kind."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ MOST_STEPS = 65535
 
 
 def encode(channel: Channel, array: NDArray[Any], files: Files | None = None) -> bytes:
-    """The bytes of a channel's file of the kind that `files` choose.
+    """The bytes of a channel's file, in the format chosen by `files`.
 
     Raises ValueError for an array of another shape or dtype than the channel's, StoreError for ids above 65535,
     MissingExtraError where a codec is not installed. Ids above 255 do not fit a palette: such a frame's map is a 16-bit PNG.
@@ -49,22 +49,20 @@ def encode(channel: Channel, array: NDArray[Any], files: Files | None = None) ->
 
 
 def _steps(depth: NDArray[np.float32], unit: float) -> NDArray[np.uint16]:
-    """Depth in whole steps, 1 to 65535, which stands for all larger depths, too; 0 where nothing is in front."""
+    """Depth in whole steps, 1 to 65535; larger depths become 65535, and pixels without a surface 0."""
     steps = np.clip(np.rint(depth.astype(np.float64) / unit), 1, MOST_STEPS)
     return np.where(np.isfinite(depth) & (depth > 0), steps, 0).astype(np.uint16)
 
 
 def depth_step(data: bytes) -> float:
-    """Metres by which neighbouring numbers in the bytes of a depth file differ; 0 where the file is exact. Raises UserError for
-    a broken one.
-    """
+    """Metres between neighbouring depth values of a file; 0 for exact files. Raises UserError for a broken file."""
     from viewsphere.codecs import png_tiff
 
     return (png_tiff.png_unit(data) or 0.0) if data[:4] == b"\x89PNG" else 0.0
 
 
 def check_codecs(channels: Container[str], files: Files) -> None:
-    """Raises MissingExtraError where a channel is to be written with a codec that is not installed."""
+    """Raise MissingExtraError if a channel needs a codec that is not installed."""
     from viewsphere.codecs.pictures import codecs
 
     for name, kind in (("rgb", files.rgb), ("rgba", files.rgba)):
@@ -86,10 +84,10 @@ def _masks(channel: Channel, array: NDArray[np.int32], indexed: bool) -> bytes:
 
 
 def decode(channel: Channel, file: Path, read: Callable[[], bytes] | None = None) -> NDArray[Any]:
-    """The array a channel's file holds, with the channel's dtype, whatever kind of file it is.
+    """The array in a channel's file of any kind, with the channel's dtype.
 
-    Pictures that were imported may be anything that Pillow reads. `read` gives the file's bytes where they are to be proved, or
-    lie elsewhere. Raises StoreError if the file is missing or broken, MissingExtraError where its codec is not installed.
+    Imported pictures may have any format that Pillow reads. `read` returns the file's bytes if they must be verified, or are
+    stored elsewhere. Raises StoreError if the file is missing or broken, MissingExtraError where its codec is not installed.
     """
     try:
         array = _decoded(channel, read() if read else read_bytes(file, "MAX_PICTURE_BYTES"))
@@ -110,7 +108,7 @@ def decode(channel: Channel, file: Path, read: Callable[[], bytes] | None = None
 
 
 def _decoded(channel: Channel, data: bytes) -> NDArray[Any]:
-    """The array in a file's bytes, whose first ones say which kind of file it is."""
+    """The array in a file's bytes; the first bytes identify the kind of file."""
     from viewsphere.codecs import exr, npz, pictures, png_tiff
 
     if channel.name in {"rgb", "rgba"}:

@@ -12,8 +12,8 @@ from viewsphere.errors import UserError
 
 @dataclass(frozen=True)
 class Choice:
-    """Frames of models whose keys match one of the patterns, and whose numbers lie in one of the ranges [first, stop);
-    without patterns all models, without ranges all numbers.
+    """Frames whose model's key matches one of the patterns, and whose number is in one of the ranges [first, stop); without
+    patterns all models, without ranges all numbers.
     """
 
     models: tuple[str, ...] = ()
@@ -29,19 +29,19 @@ class Choice:
         return not self.models or any(fnmatchcase(key, pattern) for pattern in self.models)
 
     def may_have(self, beginning: str) -> bool:
-        """Return whether a pattern may fit keys that begin so."""
+        """Return whether a pattern may match keys with this beginning."""
         literal = (re.split(r"[*?[]", pattern, maxsplit=1)[0] for pattern in self.models)
         return any(text.startswith(beginning) or beginning.startswith(text) for text in literal)
 
     def places(self, first: int, count: int) -> Sequence[int]:
-        """Return the chosen ones of the frames first, first + 1, ..., first + count - 1, counted from 0."""
+        """Return the chosen frames among first, first + 1, ..., first + count - 1, counted from 0."""
         if not self.frames:
             return range(count)
         return [i for i in range(count) if any(low <= first + i < stop for low, stop in self.frames)]
 
 
 def frame_ranges(text: str) -> tuple[tuple[int, int], ...]:
-    """Frames as people write them, `0-15,40`, both ends included, as ranges [first, stop).
+    """The frames in a text such as `0-15,40`, both ends included, as ranges [first, stop).
 
     Raises UserError for anything else.
     """

@@ -1,4 +1,4 @@
-"""The data set that a store's finished shots make up."""
+"""The data set that a store's finished shots form."""
 
 from __future__ import annotations
 
@@ -50,10 +50,10 @@ Options = Mapping[str, Mapping[str, Any]]
 
 
 class Dataset(Shown, Sequence[Sample]):
-    """The finished frames of a data set, in frame order; what `viewsphere.open` gives.
+    """The finished frames of a data set, in frame order; returned by `viewsphere.open`.
 
-    `len`, indexing and iteration give samples whose channels are read when asked for. `link` and `path` serve exporters. With
-    a choice, only the chosen frames are there.
+    `len`, indexing and iteration return samples that read their channels on access. `link` and `path` are for exporters. With a
+    choice, the data set has only the chosen frames.
     """
 
     def __init__(self, root: str | os.PathLike[str], choice: Choice | None = None) -> None:
@@ -108,7 +108,7 @@ class Dataset(Shown, Sequence[Sample]):
 
     @cached_property
     def models(self) -> tuple[ModelInfo, ...]:
-        """The finished models in the plan's order, time steps behind their model; of a choice, those that its frames have."""
+        """The finished models in the plan's order, time steps after their model; with a choice, only those of its frames."""
         stored = (self.store.model_info(key) for key in self.plan.models)
         infos = tuple(info for model in stored if model is not None for info in (model, *model.steps))
         if self.choice.is_some:
@@ -118,7 +118,7 @@ class Dataset(Shown, Sequence[Sample]):
 
     @cached_property
     def rows(self) -> tuple[Row, ...]:
-        """The rows of all finished shots, chosen or not, in frame order; without those that add channels to others."""
+        """The rows of all finished shots, chosen or not, in frame order, without shots that add channels to others."""
         keys = tuple(self.store.finished())
         rows = chain.from_iterable(index.rows_with_keys(keys) for index in self.plan.indices)
         return tuple(sorted(rows, key=lambda row: row.first))
@@ -138,8 +138,8 @@ class Dataset(Shown, Sequence[Sample]):
 
     @cached_property
     def shots_of_parts(self) -> tuple[Shot | None, ...]:
-        """A finished shot of each part; None for a part whose shots are not kept, such as an imported one, and for one of which
-        nothing is finished, another part's.
+        """A finished shot of each part. It is None for a part without stored shots, such as an imported one; a part without
+        finished frames has another part's shot.
         """
         shots = {part: self.labelled(row.key) for part, row in self._first_rows.items()}
         some = next(iter(shots.values()), None)
@@ -184,19 +184,19 @@ class Dataset(Shown, Sequence[Sample]):
             yield from self.samples_of(key, places)
 
     def select(self, *fields: str, split: str | None = None, sensor: str | None = None) -> Selection:
-        """Some fields of the frames, of one split and of one sensor or of all: a map-style data set for PyTorch's DataLoader.
-        Only what is named is decoded.
+        """Selected fields of the frames of one split or all, and of one sensor or all: a map-style data set for PyTorch's
+        DataLoader. Only the named fields are decoded.
 
         `fields`: names of channels (`rgb`), of values of samples (`index`, `split`, `sensor`, `time`, `camera.K`,
         `pose.azimuth_deg`, `camera_from_next`, ...), and of objects (`objects.box2d`, `objects.category_id`, `objects.mask`,
-        `objects.keypoints`, ...). Those of objects become arrays (N, ...), float64, int64 or bool, NaN where there is no value,
-        of run-length codes masks (N, H, W); lists where they have no one shape, or are no numbers. `objects.view` is (N, 4):
-        azimuth, elevation (degrees), distance (metres), tilt (degrees). Raises UserError for others.
+        `objects.keypoints`, ...). Fields of objects become arrays (N, ...), float64, int64 or bool, with NaN for missing
+        values. Run-length codes become masks (N, H, W). Values of several shapes, and other types, become lists. `objects.view`
+        is (N, 4): azimuth, elevation (degrees), distance (metres), tilt (degrees). Raises UserError for other fields.
         """
         return Selection(self, fields, split, sensor)
 
     def of(self, split: str | None = None, sensor: str | None = None) -> Iterator[int]:
-        """Positions of the frames of a split, and of a sensor, in the data set; reads all records."""
+        """Positions in the data set of the frames of a split and a sensor; reads all records."""
         for (key, places), first in zip(*self._shots, strict=False):
             records = self._read_records(key)
             splits, sensors = records.splits, records.sensors
@@ -207,7 +207,7 @@ class Dataset(Shown, Sequence[Sample]):
             )
 
     def shots(self) -> Iterator[tuple[str, Sequence[int]]]:
-        """Key of every finished shot, in frame order, and which of its frames are chosen, counted from 0."""
+        """Key of every finished shot, in frame order, and the places of its chosen frames, counted from 0."""
         yield from self._shots[0]
 
     def samples_of(self, key: str, places: Sequence[int]) -> Iterator[Sample]:
@@ -217,16 +217,16 @@ class Dataset(Shown, Sequence[Sample]):
             yield self.shown(self._sample(records, place))
 
     def sample_at(self, key: str, place: int) -> Sample:
-        """One of a finished shot's samples, counted from 0; the records of a few shots are kept for those who ask again."""
+        """One of a finished shot's samples, counted from 0; the records of a few shots are cached."""
         return self.shown(self._sample(self._records(key), place))
 
     def shown(self, sample: Sample) -> Sample:
-        """A sample as it is given out: as it is kept."""
+        """The sample as the data set returns it: unchanged."""
         return sample
 
     @property
     def sequences(self) -> tuple[str, ...]:
-        """Names of the sequences of its frames, in their order; none where all are still pictures."""
+        """Names of the sequences of its frames, in order; empty if all are still pictures."""
         return tuple(self._sequences)
 
     @cached_property
@@ -241,8 +241,8 @@ class Dataset(Shown, Sequence[Sample]):
         return sequences
 
     def sequence(self, name: str, sensor: str = CAMERA) -> tuple[Sample, ...]:
-        """The samples of one sensor in a sequence, in the order of its instants; raises StoreError for a sequence or a sensor
-        that is not there.
+        """The samples of one sensor in a sequence, in the order of its instants; raises StoreError for an unknown sequence or
+        sensor.
         """
         if name not in self._sequences:
             known = one_of(name, self.sequences) if self.sequences else "expected sequences, found still pictures only"
@@ -255,8 +255,8 @@ class Dataset(Shown, Sequence[Sample]):
         return tuple(samples_of_sensor)
 
     def tracks(self, sequence: str, sensor: str = CAMERA) -> PointTracks:
-        """The points that a sensor followed through a sequence; raises StoreError for a sequence or a sensor that is not there,
-        or follows no points.
+        """The points that a sensor followed through a sequence; raises StoreError for an unknown sequence or sensor, or a
+        sensor that follows no points.
         """
         samples = self.sequence(sequence, sensor)
         if samples and "tracks" not in samples[0].channels and any(part.recipe.get("tracks") for part in self.plan.parts):
@@ -268,7 +268,7 @@ class Dataset(Shown, Sequence[Sample]):
 
     def _places(self, row: Row) -> Sequence[int]:
         """Return the chosen frames of a finished shot, by the model's key, or for an animated model by the key of its moment.
-        Where the plan has no model for a frame, as in imported data sets, the frame belongs to all models that it shows.
+        If the plan has no model for a frame, as in imported data sets, the frame belongs to all models that it shows.
         """
         places = self.choice.places(row.first, row.count)
         if not self.choice.models or not places:
@@ -283,8 +283,8 @@ class Dataset(Shown, Sequence[Sample]):
         return [place for place, sample in shown if any(self._is_chosen(o, model) for o in sample.objects)]
 
     def _is_chosen(self, shown: ObjectAnnotation, model: str | None) -> bool:
-        """Return whether an object makes its frame a chosen one: if the frame's model is known, only an object of this model
-        can.
+        """Return whether an object makes its frame a chosen one. If the frame's model is known, only objects of this model
+        count.
         """
         if model is None:
             return self.choice.has_model(shown.key) or self.choice.has_model(shown.track)
@@ -325,7 +325,7 @@ class Dataset(Shown, Sequence[Sample]):
         return _Records(file, records, ShotRecords(shot, self._facts, str(file), str(self.root)), files)
 
     def labelled(self, key: str) -> Shot | None:
-        """A finished shot as `Store.labelled` gives it; raises StoreError for one of more or fewer samples than are planned."""
+        """A finished shot as `Store.labelled` gives it; raises StoreError if the number of samples differs from the plan."""
         shot, row = self.store.labelled(key), self.plan.find(key)
         if shot is not None and row is not None and (count := sum(1 for _ in shot.samples)) != row.count:
             file = self.store.shot_folder(key) / "shot.json"
@@ -355,7 +355,7 @@ class Dataset(Shown, Sequence[Sample]):
             raise _damaged(records.file, error) from None
 
     def _named(self, sample: Sample) -> Sample:
-        """A sample whose names may stand in an export's paths; raises ValueError for any other."""
+        """The sample, if its names are valid in an export's paths; raises ValueError otherwise."""
         if sample.split not in self.splits:
             raise ValueError(f"split {sample.split!r:.100} where one of the plan's is expected")
         names([*sample.files], "channel")
@@ -370,7 +370,7 @@ class Dataset(Shown, Sequence[Sample]):
         return frozenset(category.id for category in self.categories)
 
     def _supplied(self, record: dict[str, Any]) -> tuple[dict[str, str], Options]:
-        """Files of channels that were added to a frame later, and the options that these labels were given."""
+        """Files of channels that were added to a frame later, and the options of these labels."""
         files, options = dict[str, str](), dict[str, Mapping[str, Any]]()
         number = record["index"]
         for index, added in self.plan.supplements:
@@ -389,7 +389,7 @@ class Dataset(Shown, Sequence[Sample]):
 
     @cached_property
     def kinds(self) -> tuple[Files, ...]:
-        """The kinds of files that each part has written; raises StoreError where its recipe says others than there are."""
+        """The kinds of files that each part has written; raises StoreError if its recipe names other kinds."""
         try:
             return tuple(typed(_FILES, part.recipe.get("files", {})) for part in self.plan.parts)
         except ValueError as error:
@@ -402,15 +402,13 @@ class Dataset(Shown, Sequence[Sample]):
         return file_inside(self.root, relative)
 
     def read(self, relative: str) -> bytes:
-        """The bytes of a channel's file, wherever it lies. Raises StoreError where they are not those that were written, or for
-        a path that leads out of the data set; OSError where the file cannot be read.
+        """The bytes of a channel's file, also from a tar. Raises StoreError if they changed since they were written, or for a
+        path that leaves the data set; OSError if the file cannot be read.
         """
         return _read(self.root, self._manifests, relative)
 
     def stored(self, relative: str) -> Path | Loaded:
-        """A stored file, or what it would hold where it lies in its shot's tar. Raises StoreError for a path that leads out of
-        the data set.
-        """
+        """A stored file, or its content if it is in its shot's tar. Raises StoreError for a path that leaves the data set."""
         file = self.path(relative)
         if relative.startswith("store/shots/"):
             folder, inside = _parted(relative)
@@ -419,8 +417,8 @@ class Dataset(Shown, Sequence[Sample]):
         return file
 
     def link(self, relative: str, destination: Path) -> None:
-        """Put a stored file at `destination`: a hard link, else a reflink, else a copy; `link_kinds` says which. One out of a
-        shot's tar is always a copy. Raises StoreError for a path that leads out of the data set.
+        """Put a stored file at `destination`: a hard link, else a reflink, else a copy; `link_kinds` records the kind. A file
+        from a shot's tar is always copied. Raises StoreError for a path that leads out of the data set.
         """
         if not destination.parent.is_dir():
             destination.parent.mkdir(parents=True, exist_ok=True)
@@ -431,16 +429,16 @@ class Dataset(Shown, Sequence[Sample]):
             self.link_kinds.add(link_file(file.resolve() if file.is_symlink() else file, destination))
 
     def put(self, frame: int, name: str, make: Callable[[], bytes], destination: Path) -> None:
-        """Put what `make` gives at `destination`; where another export of this pass put the same of a frame, by the name of its
-        encoding, it is linked.
+        """Write the result of `make` to `destination`. If another export of this pass wrote the same encoding of the frame, by
+        its name, that file is linked.
         """
         kind = self.made.put(frame, name, make, destination)
         if kind:
             self.link_kinds.add(kind)
 
     def mesh(self, key: str) -> Mesh:
-        """A finished model, or a time step of one, with its materials, in object axes: as its GLB has it. Raises StoreError for
-        one that is not there.
+        """A finished model, or a time step of one, with its materials, in object axes, as in its GLB. Raises StoreError if it
+        is absent.
         """
         from viewsphere.assets.exporting.exported import read_exported
 
@@ -473,20 +471,20 @@ class Dataset(Shown, Sequence[Sample]):
                     yield f"{key}/{file.name}", file.relative_to(self.root).as_posix()
 
     def link_models(self, folder: Path) -> None:
-        """Put the files of every finished model into `folder`/<key>, as `link` does."""
+        """Link the files of every finished model into `folder`/<key>; see `link`."""
         for inside, stored in self.model_files():
             self.link(stored, folder / inside)
 
 
 def _with_options(sample: Sample, options: Options) -> Sample:
-    """The sample, of whose labels some have these options."""
+    """The sample, with these options for some of its labels."""
     return replace(sample, options={**sample.options, **options}) if options else sample
 
 
 @dataclass(frozen=True, eq=False)
 class _Records:
-    """A shot's frames.json, and, for short records, what else their samples need: the shot, and the names of its channels'
-    files (channel, and the path before and after a sample's number).
+    """A shot's frames.json. For short records, it comes with the shot and the names of its channels' files (channel, and the
+    path before and after a sample's number).
     """
 
     file: Path
@@ -519,18 +517,18 @@ class _Records:
 
 
 class _ChannelFiles(Mapping[str, NDArray[Any]]):
-    """A frame's channels, each read from its file the first time it is asked for."""
+    """A frame's channels, each read from its file on first access."""
 
     def __init__(self, root: Path, files: Mapping[str, str], manifest_of: ManifestOf) -> None:
         self._root, self._files, self._manifest_of = root, files, manifest_of
         self._arrays: dict[str, NDArray[Any]] = {}
 
     def __copy__(self) -> Self:
-        """The same files; none of them is read so far."""
+        """A copy with the same files, none of them read yet."""
         return type(self)(self._root, self._files, self._manifest_of)
 
     def __getstate__(self) -> dict[str, Any]:
-        """The state sent to other processes, which read manifests anew."""
+        """The state sent to other processes, which read the manifests again."""
         return {**self.__dict__, "_manifest_of": partial(_manifest_of, self._root)}
 
     def __getitem__(self, name: str) -> NDArray[Any]:
@@ -544,7 +542,7 @@ class _ChannelFiles(Mapping[str, NDArray[Any]]):
         return self._arrays[name]
 
     def __contains__(self, name: object) -> bool:
-        """Without reading the file."""
+        """Return whether the frame has the channel, without reading the file."""
         return name in self._files
 
     def __iter__(self) -> Iterator[str]:
@@ -557,7 +555,7 @@ class _ChannelFiles(Mapping[str, NDArray[Any]]):
 _FILES = TypeAdapter(Files)
 
 ManifestOf = Callable[[str], Manifest]
-"""Gives the manifest of a folder, by its path from the data set's root."""
+"""Returns the manifest of a folder, given by its path from the data set's root."""
 
 
 def _manifest_of(root: Path, folder: str) -> Manifest:
@@ -565,14 +563,14 @@ def _manifest_of(root: Path, folder: str) -> Manifest:
 
 
 def _read(root: Path, manifest_of: ManifestOf, relative: str) -> bytes:
-    """The bytes of a channel's file, which are those that were written."""
+    """The verified bytes of a channel's file."""
     folder, inside = _parted(relative)
     manifest = manifest_of(folder)
     return manifest.content(inside, file_inside(root, f"{folder}/{manifest.holder(inside)}"))
 
 
 def _parted(file: str) -> tuple[str, str]:
-    """A channel's file by its shot's folder, and by its path there."""
+    """A channel's file as its shot's folder and its path in that folder."""
     path = PurePosixPath(file)
     return path.parent.parent.as_posix(), f"{path.parent.name}/{path.name}"
 
@@ -585,14 +583,14 @@ def _damaged(file: Path, error: Exception) -> StoreError:
 
 
 class Made:
-    """The files made of the frame that is exported now, by the names of their encodings."""
+    """The files made for the currently exported frame, by the names of their encodings."""
 
     def __init__(self) -> None:
         self._frame = -1
         self._files: dict[str, Path] = {}
 
     def put(self, frame: int, name: str, make: Callable[[], bytes], file: Path) -> str | None:
-        """Write what `make` gives into a file, or link it to where the same was written before; says how it was linked."""
+        """Write the result of `make` to a file, or link it to an equal file written before; returns the kind of link."""
         if frame != self._frame:
             self._frame, self._files = frame, {}
         first = self._files.setdefault(name, file)
@@ -603,8 +601,8 @@ class Made:
 
 
 class Exported(Dataset):
-    """A data set whose samples lack the annotations that exports leave out: of what is seen no more than `least`, if that
-    is said.
+    """A data set whose samples lack the annotations that exports leave out: those with a visibility of at most `least`, if
+    given.
     """
 
     def __init__(self, root: str | os.PathLike[str], choice: Choice | None, least: float | None) -> None:
@@ -615,7 +613,7 @@ class Exported(Dataset):
         return type(self), (self.root, self.choice, self.least)
 
     def shown(self, sample: Sample) -> Sample:
-        """A sample of the data set with the annotations that are kept; of imported ones nobody knows the visibility."""
+        """A sample of the data set with the kept annotations; imported objects have no known visibility."""
         if self.least is None:
             return sample
         kept = tuple(o for o in sample.objects if o.source is not None or o.visibility > self.least)

@@ -1,4 +1,4 @@
-"""Sequences as films: which samples are seen together, and for how long."""
+"""Sequences as films: the samples shown together, and their durations."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ from viewsphere.store.samples.dataset import Dataset
 from viewsphere.validation.errors import one_of
 
 ALONE = 1.0
-"""Seconds for which the only instant of a film is shown."""
+"""Seconds for which a film with a single instant shows it."""
 
 
 @dataclass(frozen=True)
 class Film:
-    """One sequence: the sensors that are shown, and, instant by instant, its number, its time in seconds and the place of each
-    sensor's sample among all samples.
+    """One sequence: its shown sensors, and for each instant its number, its time in seconds, and the place of each sensor's
+    sample among all samples.
     """
 
     sequence: str
@@ -36,14 +36,16 @@ class Film:
 
     @property
     def shown_for(self) -> tuple[float, ...]:
-        """Seconds from each instant to the next; the last one is shown as long as the shortest of the others."""
+        """Seconds from each instant to the next; the last one lasts as long as the shortest of the others."""
         if len(self.times) == 1:
             return (ALONE,)
         steps = np.diff(self.times).tolist()
         return (*steps, min(steps))
 
     def spread(self, count: int) -> tuple[int, ...]:
-        """Return evenly spaced instants, counted from 0: the first, the last and others between; all if there are so few."""
+        """Return evenly spaced instants, counted from 0: the first, the last and others between; all if there are no more than
+        `count`.
+        """
         last = len(self.instants) - 1
         return tuple(np.unique(np.linspace(0, last, min(count, last + 1)).round().astype(int)).tolist())
 
@@ -57,10 +59,10 @@ IsShown = Callable[[Container[str]], Any]
 
 
 def films_of(samples: Sequence[Sample], is_shown: IsShown = picture_of) -> list[Film]:
-    """The sequences of samples, in their order; none of still pictures. Sensors and instants of which nothing is shown, by
-    default those without pictures, are left out.
+    """The sequences of samples, in order; empty for still pictures. Sensors and instants with nothing to show, by default those
+    without pictures, are left out.
 
-    Of a data set no sample is read.
+    If `samples` is a data set, no sample is read.
     """
     return _films(_in_shots(samples, is_shown) if isinstance(samples, Dataset) else _in_memory(samples, is_shown))
 
@@ -72,7 +74,7 @@ def _in_memory(samples: Iterable[Sample], is_shown: IsShown) -> Iterator[Seen]:
 
 
 def _in_shots(dataset: Dataset, is_shown: IsShown) -> Iterator[Seen]:
-    """Parts of a data set without a time have no sequences; their shots are not read."""
+    """The samples of sequences in a data set. Parts without `time` have no sequences; their shots are not read."""
     start = 0
     parts = dataset.plan.parts
     for key, places in dataset.shots():
@@ -124,13 +126,13 @@ def film_named(films: Sequence[Film], name: str) -> Film:
 
 @dataclass(frozen=True, eq=False)
 class Earlier:
-    """The earlier samples of sensors: of a sample, those of its own sensor at up to `labels.TAIL` instants before, in order."""
+    """The earlier samples of a sample's own sensor, at up to `labels.TAIL` instants before it, in order."""
 
     samples: Sequence[Sample]
     films: Sequence[Film]
 
     def __call__(self, sample: Sample) -> list[Sample]:
-        """The samples before one."""
+        """The samples before this one."""
         film = self._by_name.get(sample.sequence)
         if film is None or sample.sensor not in film.sensors:
             return []

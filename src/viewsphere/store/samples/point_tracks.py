@@ -17,14 +17,15 @@ Float = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class PointTracks:
-    """N points that one sensor followed through the T instants of a sequence that are finished.
+    """N points that one sensor followed through the T finished instants of a sequence.
 
     ids (N,) int64: their numbers, in the order of the queries; query (N, 3) float64: the instant, and the position (x, y) in
-    pixels, at which each was picked; object (N,) int32: id of the object that it lies on, 0 for none.
+    pixels, at which each was picked; object (N,) int32: id of the object at the point, 0 for none.
 
-    At each instant: xy (T, N, 2) float64 pixels, NaN where it has none; xyz (T, N, 3) float64 metres in the camera's axes,
-    world (T, N, 3) in the world's, NaN where it is nowhere: points of the sky have xyz (NaN, NaN, inf) and world NaN; state
-    (T, N) uint8: 0 visible, 1 occluded, 2 outside, 3 behind, 4 invalid. instants (T,) int64 are the instants' numbers.
+    At each instant: xy (T, N, 2) float64 pixels, NaN for points without a position; xyz (T, N, 3) float64 metres in the
+    camera's axes, world (T, N, 3) in the world's, NaN where it is nowhere: points of the sky have xyz (NaN, NaN, inf) and world
+    NaN; state (T, N) uint8: 0 visible, 1 occluded, 2 outside, 3 behind, 4 invalid. instants (T,) int64 are the instants'
+    numbers.
     """
 
     ids: NDArray[np.int64]
@@ -38,8 +39,8 @@ class PointTracks:
 
 
 def joined(samples: Sequence[Sample]) -> PointTracks:
-    """The tracks of one sensor's samples of one sequence, instant by instant; raises StoreError where samples have none, or
-    follow other points.
+    """The tracks of one sensor's samples of one sequence, instant by instant; raises StoreError if samples have no tracks, or
+    follow different points.
     """
     rows = [sample.channels.get("tracks") for sample in samples]
     known = [row for row in rows if row is not None]

@@ -25,10 +25,10 @@ OF_POSE = ("pose.azimuth_deg", "pose.elevation_deg", "pose.distance", "pose.tilt
 
 
 class Selection(Sequence[dict[str, Any]]):
-    """Some fields of some frames: item i is a dict of the fields of the i-th frame; what `Dataset.select` gives.
+    """Some fields of some frames: item i is a dict of the fields of the i-th frame; returned by `Dataset.select`.
 
-    A map-style data set for PyTorch's DataLoader, which needs no PyTorch itself: it has a length, reads any item at once and
-    in memory that does not grow, and travels to workers as the data set's path.
+    A map-style data set for PyTorch's DataLoader, which needs no PyTorch itself: it has a length and random access, its memory
+    does not grow, and workers receive it as the data set's path.
     """
 
     def __init__(self, dataset: Dataset, fields: Sequence[str], split: str | None = None, sensor: str | None = None) -> None:
@@ -64,7 +64,7 @@ class Selection(Sequence[dict[str, Any]]):
 
 
 def _check_asked(dataset: Dataset, fields: Sequence[str]) -> None:
-    """Raises UserError for fields of labels that nobody asked for, as the first frame shows."""
+    """Raise UserError for fields of labels that were not requested; the first frame is checked."""
     labels = {field.name: label for label in on_request().values() for field in label.fields}
     for name in fields:
         label = labels.get(name.removeprefix("objects."))
@@ -96,12 +96,12 @@ def _of_pictures() -> dict[str, Field]:
 
 
 DTYPES: dict[Any, Any] = {float: np.float64, int: np.int64, bool: np.bool_}
-"""Of arrays, by the types of numbers."""
+"""Dtypes of arrays, by the types of numbers."""
 
 
 def _stacked(sample: Sample, name: str) -> NDArray[Any] | list[Any]:
-    """A field of all objects: an array (N, ...), NaN where an object has no such value; of run-length codes the masks; a list
-    of what has no one shape, texts and arrays of other lengths among it.
+    """A field of all objects: an array (N, ...), with NaN for missing values, or masks for run-length codes. Texts and values
+    of several shapes are a list.
     """
     field, values = _of_objects()[name], [getattr(o, name) for o in sample.objects]
     size = sample.height, sample.width

@@ -1,4 +1,4 @@
-"""The store of simulation results, such as the rest poses of a heap: each is made once, and kept.
+"""The store of simulation results, such as the rest poses of a heap: each is computed once, and stored.
 
 Two machines may differ in the last bit of a result. So all shots of a scene use the result that was kept first, on any
 machine and after any crash. An entry is a folder with one file: OUT/store/simulated/ab/<the rest of the digest>/made.json.
@@ -22,15 +22,13 @@ MADE = "made.json"
 
 @dataclass(frozen=True)
 class Simulated:
-    """Keeps what is simulated for a data set in its store; without `writes` it only reads what is kept there."""
+    """Keeps the simulation results of a data set in its store; without `writes`, it only reads stored results."""
 
     root: Path
     writes: bool = True
 
     def __call__(self, names: tuple[str, ...], make: Callable[[], Any]) -> Any:
-        """The plain data that was first made for these names, else what `make` makes. Raises StoreError for an entry that
-        cannot be read.
-        """
+        """The plain data first stored for these names, else the result of `make`. Raises StoreError for an unreadable entry."""
         digest = hashlib.sha256("\0".join(names).encode()).hexdigest()
         store = Store(self.root)
         folder = store.folder / "simulated" / digest[:2] / digest[2:40]

@@ -1,4 +1,4 @@
-"""The finished shots of a store that others may be writing to, found again and again for little."""
+"""Repeated, cheap searches for the finished shots of a store that other processes may be writing to."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from viewsphere.store.shots.folder import Store
 from viewsphere.store.shots.manifest import MANIFEST
 
 SETTLED = 2.0
-"""Seconds after which a folder's time tells whether anything came into it since: file systems count time in steps."""
+"""Seconds after which a folder's modification time reliably shows new entries: file systems store time in coarse steps."""
 
 
 @dataclass(frozen=True)
 class Finished:
-    """A shot that is there: its key, when it was finished, in seconds since 1970 by its manifest's time, and whether it was
-    told of before, and was made again since.
+    """A finished shot: its key, the time of its manifest in seconds since 1970, and whether it was reported before and has been
+    made again since.
     """
 
     key: str
@@ -27,9 +27,9 @@ class Finished:
 
 
 class Watch:
-    """Tells of each shot of a store once, when it is finished, and again when it was made again.
+    """Reports each shot of a store once, when it is finished, and again if it is made again.
 
-    Only those folders are read into which something came since.
+    Only folders with new entries are read.
     """
 
     def __init__(self, store: Store) -> None:
@@ -38,7 +38,7 @@ class Watch:
         self._made: dict[str, float] = {}
 
     def news(self) -> Iterator[Finished]:
-        """The shots that were finished since it was asked before, in no order."""
+        """The shots finished since the previous call, in no order."""
         with suppress(FileNotFoundError), os.scandir(self._folder) as groups:
             for group in groups:
                 with suppress(FileNotFoundError, NotADirectoryError):

@@ -1,13 +1,13 @@
-"""The digests of an export's files, one line a file, in a file that `xxhsum --check` reads, too, and that proves itself.
+"""The digests of an export's files, one line a file, in a self-checking file that `xxhsum --check` also reads.
 
-    # options {"category_ids":"contiguous"}         of a format that has some: those that the export was written with
-    # keep_annotations_above 0.1                    of an export that leaves annotations out: the visibility it was written with
-    # credits "0c94a3..."                           of an export that names them: the digest of what CREDITS.md said then
-    # frames 12                                     how many frames it has: those that were finished then
+    # options {"category_ids":"contiguous"}         the export's format options, if the format has any
+    # keep_annotations_above 0.1                    the visibility, for an export that leaves annotations out
+    # credits "0c94a3..."                           the digest of CREDITS.md, for an export that names credits
+    # frames 12                                     the number of frames, all those finished at the time
     6f0c3b...  annotations/instances_train.json
     # 91d2...
 
-No more of it is held in memory than a line. The last line is the digest of all lines above.
+Reading needs memory for one line only. The last line is the digest of all lines above.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ CHECKSUMS = "checksums.xxh128"
 """Name of the file in an export's folder."""
 
 AT_ONCE = 8
-"""Files that are read at once: disks and storages answer many faster than one after another."""
+"""Number of files that are read in parallel: disks and storages are faster so."""
 
 OPTIONS = "# options "
 KEPT = "# keep_annotations_above "
@@ -49,8 +49,8 @@ def write_checksums(
     credited: str | None = None,
     frames: int | None = None,
 ) -> None:
-    """List all files of a finished folder, the options that they were written with, the visibility above which they keep
-    annotations (None: all), the digest of the credits that they name (None: of none), and how many frames they are of.
+    """List all files of a finished folder, with the export's options, the visibility above which it keeps annotations (None:
+    all), the digest of its credits (None: no credits), and its number of frames.
     """
     seal = xxhash.xxh3_128()
     with (folder / CHECKSUMS).open("wb") as file:
@@ -75,17 +75,17 @@ def _to_write(
 
 
 def written_options(folder: Path) -> dict[str, Any]:
-    """The options that a folder's files were written with; none where there is no list, or none that can be read."""
+    """The options of a folder's export; empty without a readable list."""
     return _said(folder, OPTIONS) or {}
 
 
 def written_least(folder: Path) -> float | None:
-    """The visibility above which a folder's files were written with annotations; None: they have all."""
+    """The visibility above which a folder's files have annotations; None: they have all."""
     return _said(folder, KEPT)
 
 
 def written_credits(folder: Path) -> str | None:
-    """The digest of the credits that a folder's files were written with; None: they name none."""
+    """The digest of the credits in a folder's export; None if it has no credits."""
     return _said(folder, CREDITED)
 
 
@@ -105,7 +105,7 @@ def _said(folder: Path, mark: str) -> Any:
 def damaged_files(folder: Path) -> Iterator[str]:
     """Yield the differences of a folder from its list: files that are missing, changed, or additional."""
     try:
-        listed = sum(1 for _ in _lines(folder))  # the list itself is proved first
+        listed = sum(1 for _ in _lines(folder))  # the list itself is verified first
         for digest, path, found in _compared(folder):
             if found != digest:
                 yield f"{path}: expected digest {digest[:12]}, found {(found and found[:12]) or 'no such file'}: {AGAIN}"
@@ -119,7 +119,7 @@ def damaged_files(folder: Path) -> Iterator[str]:
 
 
 def _compared(folder: Path) -> Iterator[tuple[str, str, str | None]]:
-    """Digest and path of every file that is listed, and the digest that it has; several are read at once."""
+    """Listed digest, path and actual digest of every listed file; several files are read in parallel."""
     lines = _lines(folder)
     with ThreadPoolExecutor(AT_ONCE) as pool:
         while some := list(islice(lines, AT_ONCE * 16)):
@@ -128,7 +128,7 @@ def _compared(folder: Path) -> Iterator[tuple[str, str, str | None]]:
 
 
 def _lines(folder: Path) -> Iterator[tuple[str, str]]:
-    """Digest and path of every file that is listed; raises ValueError at the end where the list was changed."""
+    """Digest and path of every listed file; raises ValueError at the end if the list was changed."""
     seal, last = xxhash.xxh3_128(), b""
     with open_file(folder / CHECKSUMS) as file:
         for line in file:

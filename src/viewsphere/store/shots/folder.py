@@ -1,4 +1,4 @@
-"""The store's folder: finished shots and models, each written aside and put in its place when whole."""
+"""The store's folder: finished shots and models, each written to a scratch folder and moved into place when complete."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ from viewsphere.validation.errors import different, first_of
 from viewsphere.validation.quantity import first_few
 
 RUN = "run.json"
-"""The heartbeat of a run, in the folder that it has aside, which goes with it."""
+"""File name of a run's heartbeat in its scratch folder; it is removed with that folder."""
 
 
 @dataclass(frozen=True)
@@ -71,7 +71,7 @@ class Store:
         return self.folder / "plan.json"
 
     def plan(self) -> PlanRecord:
-        """The plan this store was made for; raises StoreError if there is none or it cannot be read."""
+        """The plan of this store; raises StoreError if it is missing or unreadable."""
         if self.root.is_file():
             raise StoreError(
                 f"{self.root}: expected a folder that `render` wrote; found a file: if it is a recipe, render it first "
@@ -91,11 +91,11 @@ class Store:
             raise StoreError(f"{self.plan_file}: expected a readable plan, found {type(error).__name__}: {error}") from None
 
     def open_for(self, plan: PlanRecord) -> None:
-        """Make the folder ready for this plan, or find it half done by the same one.
+        """Prepare the folder for this plan, or continue a folder of the same plan.
 
-        Another recipe's plan gives way while none of its frames is finished and nobody works on them, so that a recipe
-        can be mended and tried again. Raises StoreError if the folder cannot be written, holds another recipe's data, or
-        files that viewsphere did not make.
+        Another recipe's plan is replaced while none of its frames is finished and no run is active, so that you can correct a
+        recipe and try again. Raises StoreError if the folder cannot be written, holds another recipe's data, or files that
+        viewsphere did not make.
         """
         self._refuse_strangers()
         self.make_ready()
@@ -111,7 +111,7 @@ class Store:
 
     @contextmanager
     def opened_for(self, plan: PlanRecord) -> Generator[Path]:
-        """`open_for`, then `occupied`, with nobody else in between."""
+        """`open_for`, then `occupied`, without another run in between."""
         self._refuse_strangers()
         self.make_ready()
         with ExitStack() as stack:
@@ -121,14 +121,14 @@ class Store:
             yield occupied_folder
 
     def occupied(self) -> AbstractContextManager[Path]:
-        """Show other runs that this one is at work, by a folder of this machine that it has aside as long as the block lasts;
-        then what workers left that died goes, too.
+        """Show other runs that this one is active, by a scratch folder of this machine during the block. Its end also removes
+        the remains of dead workers.
         """
         return self.place.occupied()
 
     def locked(self) -> AbstractContextManager[None]:
-        """Nobody else changes what runs have in common (the plan, what was left out, credits) as long as the block lasts, where
-        that can be known. Blocks may be nested; a lock ends with its process.
+        """Keep other runs from changing shared files (plan, left-out models and shots, credits) during the block, where the
+        place supports that. Blocks may be nested; a lock ends with its process.
         """
         return self.place.locked()
 
@@ -149,7 +149,7 @@ class Store:
                 raise
 
     def _note_failure(self, note: Path, text: str) -> None:
-        with suppress(OSError, StoreError):  # the error itself is what is told
+        with suppress(OSError, StoreError):  # the error itself is reported
             self._write_atomically(note, text)
 
     def _tell(self, own: Path, text: str) -> None:
@@ -158,8 +158,8 @@ class Store:
             move(own / NEW, own / RUN)
 
     def heartbeats(self) -> tuple[tuple[Heartbeat, bool | None], ...]:
-        """Return the last report of each run at work, and whether the run is alive, None if unknown.
-        Dead runs are included while their remains are not removed.
+        """Return the last report of each active run, and whether the run is alive, None if unknown. Dead runs are included
+        while their remains are not removed.
         """
         files = sorted((self.folder / "writing").glob(f"*/{RUN}"))
         return tuple((heartbeat_, lives(file.parent)) for file in files if (heartbeat_ := Heartbeat.read(file)))
@@ -177,7 +177,7 @@ class Store:
         return self.folder / "failed"
 
     def save(self, plan: PlanRecord) -> None:
-        """Put a plan in the place of the one that it continues."""
+        """Replace the stored plan by one that continues it."""
         self._write_atomically(self.plan_file, plan.to_json())
 
     def gaps(self, plan: PlanRecord, finished: Sequence[str] | None = None) -> Iterator[Gap]:
@@ -208,13 +208,13 @@ class Store:
         return self.place.finished()
 
     def wanted(self, plan: PlanRecord) -> Iterator[Row]:
-        """The shots of a plan, those with channels that were added later last, but for what was left out at the user's wish."""
+        """The shots of a plan, without those left out at the user's request; shots that add channels come last."""
         skipped = self.skipped().keys()
         rows = chain.from_iterable(index.without(skipped) for index in plan.all_indices)
         return (row for row in rows if row.key not in skipped)
 
     def drop_unnamed_models(self) -> None:
-        """Remove the models that the plan does not name, unless another run is at work on them."""
+        """Remove the models that the plan does not name, unless another run is using them."""
         with self.locked():
             if self.place.others_at_work():
                 return
@@ -224,7 +224,7 @@ class Store:
                     self.place.remove(folder)
 
     def make_ready(self) -> None:
-        """See that the folder can be written, and clear what dead runs left; raises StoreError if it cannot."""
+        """Check that the folder can be written, and remove the remains of dead runs; raises StoreError if it cannot."""
         self.place.make()
 
     def _refuse_strangers(self) -> None:
@@ -289,11 +289,11 @@ class Store:
 
     @contextmanager
     def scratch_folder(self, target: Path, again: bool = False) -> Generator[Path]:
-        """A folder to write into that becomes `target` when the block ends well, and is removed when it does not. The last file
-        in it is the manifest.
+        """A folder to write into that becomes `target` if the block succeeds, and is removed otherwise. Its manifest is written
+        last.
 
-        If another writer finished the same target first, that one stays: both hold the same bytes. With `again` it takes the
-        place of a damaged one; raises StoreError where it is not equal to what that was before, as far as that is known.
+        If another writer finished the same target first, that folder stays: both hold the same bytes. With `again`, the new
+        folder replaces a damaged one; raises StoreError if it differs from the known original content.
         """
         with self.place.scratch_folder() as scratch:
             folder = scratch / NEW
@@ -309,8 +309,8 @@ class Store:
 
     @contextmanager
     def replacing(self, target: Path) -> Generator[Path]:
-        """A folder to write into that takes the place of `target` when the block ends well; a model's gets a manifest. The old
-        one is never lost: where a run dies between the two, the next one puts it back.
+        """A folder to write into that replaces `target` if the block succeeds; a model's folder gets a manifest. The old folder
+        is never lost: if a run dies between the two moves, the next run puts it back.
         """
         if target == self.folder:
             raise StoreError(f"{target}: expected a format's name, found the store's")
@@ -331,7 +331,7 @@ class Store:
         self._write_atomically(self.root / name, text)
 
     def skipped(self) -> dict[str, str]:
-        """Models and shots that were left out at the user's wish, and why; raises StoreError if that cannot be read."""
+        """Models and shots left out at the user's request, and the reasons; raises StoreError if the list is unreadable."""
         file = file_inside(self.root, "store/skipped.json")
         try:
             found: dict[Any, Any] = parsed(read_bytes(file, "MAX_RECORD_BYTES"))
@@ -357,8 +357,8 @@ class Store:
     ) -> int:
         """Write all frames of a shot, with the channels their samples hold; return their number.
 
-        `scenery`, if any, is a text that says what stands there that is no object; `kinds` of files are the default ones.
-        What is known of the `shot` besides is kept for those who make its scene anew; `painter` as for `Manifest`.
+        `scenery`, if any, is a text that describes the scenery that is not an object; `kinds` are the default kinds of files.
+        Other facts of the `shot` are stored, so that its scene can be made again; `painter` as for `Manifest`.
         """
         target = self.shot_folder(key)
         prefix = target.relative_to(self.root).as_posix()
@@ -384,9 +384,7 @@ class Store:
         return len(records)
 
     def labelled(self, key: str) -> Shot | None:
-        """A finished shot with what is labelled of its things; None where that is not known. Raises StoreError if it cannot be
-        read.
-        """
+        """A finished shot with its labelled things; None if they are unknown. Raises StoreError if it is unreadable."""
         file = self.shot_folder(key) / "shot.json"
         try:
             return Shot.model_validate_json(read_bytes(file, "MAX_RECORD_BYTES"))
@@ -406,20 +404,20 @@ class Store:
         return shot and shot.model_copy(update={"things": (*shot.things, *around)})
 
     def known_of(self, key: str) -> list[Path]:
-        """The files that say what a finished shot's scene was."""
+        """The files that describe a finished shot's scene."""
         folder = self.shot_folder(key).relative_to(self.root).as_posix()
         files = (file_inside(self.root, f"{folder}/{name}") for name in ("scenery.json", "shot.json"))
         return [file for file in files if file.is_file()]
 
     def scenery(self, key: str) -> str:
-        """The text that `write_shot` was given of a shot's scenery; empty if none."""
+        """The scenery text of a shot, as given to `write_shot`; empty if none."""
         try:
             return read_text(self.shot_folder(key) / "scenery.json", "MAX_RECORD_BYTES")
         except FileNotFoundError:
             return ""
 
     def write_model_info(self, folder: Path, info: ModelInfo) -> None:
-        """Write model.json into a model's folder that is being made."""
+        """Write model.json into the unfinished folder of a model."""
         (folder / "model.json").write_text(json.dumps(info.to_plain(), indent=1), "utf-8", newline="\n")
 
     def model_info(self, key: str) -> ModelInfo | None:
@@ -440,7 +438,7 @@ class Store:
 
 
 def kept_shot(shot: Shot) -> Shot:
-    """The shot as shot.json holds it: the other things are in scenery.json, and labels are those of the instant."""
+    """The shot as stored in shot.json: without the things of scenery.json, and with the labels of the instant."""
     return shot.model_copy(update={"things": shot.objects, "shutter": 0.0, "exposures": ()})
 
 
@@ -452,7 +450,7 @@ def _no_scene(file: Path, error: Exception) -> StoreError:
 
 
 def new_folder(target: Path) -> AbstractContextManager[Path]:
-    """A folder to write into that becomes `target` when the block ends well; raises StoreError where files lie there."""
+    """A folder to write into that becomes `target` if the block succeeds; raises StoreError if `target` has files."""
     return place_of(target).new()
 
 
@@ -464,7 +462,7 @@ def channel_path(channel: str, sample: int, kinds: Files | None = None) -> str:
 
 
 def _held(indices: Iterable[Index], keys: Iterable[str]) -> Iterator[tuple[str, str, int]]:
-    """Key, subject and number of samples of the shots of these keys in some indices."""
+    """Key, subject and number of samples of the shots with these keys in some indices."""
     return chain.from_iterable(index.held(keys) for index in indices)
 
 

@@ -24,22 +24,22 @@ BEAT_S = 5.0
 """Seconds from one heartbeat to the next."""
 
 SILENT_S = 120.0
-"""Seconds without a heartbeat after which a run of which nothing else is known is told as silent: clocks differ, and network
-file systems show changes late.
+"""Seconds without a heartbeat after which a run of unknown state is reported as silent: clocks differ, and network file systems
+show changes late.
 """
 
 MOST = 2.0**53
-"""Frames and seconds that a run may tell of: larger ones are no numbers of a run."""
+"""Largest number of frames or seconds in a valid report."""
 
 
 @dataclass(frozen=True)
 class Heartbeat:
-    """The report of a run on itself.
+    """The report of a run about its own progress.
 
     `shard` (k, n): it renders the k-th of n shares. `done` of `total` count frames in the phase "frames", else the units of
-    that phase. `resumed` of them were there before. `under_way` are in unfinished shots: those of the keys `working_on`.
-    `begun` and `beat` are the times of the phase's start and of this report, in seconds since 1970. `error`: the reason for the
-    run's end.
+    that phase. `resumed` of them existed before the run. `under_way` counts those in unfinished shots, whose keys are
+    `working_on`. `begun` and `beat` are the times of the phase's start and of this report, in seconds since 1970. `error`: the
+    reason for the run's end.
     """
 
     host: str
@@ -57,7 +57,7 @@ class Heartbeat:
 
     @property
     def rate(self) -> float:
-        """Frames a second that it makes now; 0 where it makes none, or it cannot be known yet."""
+        """Current frames per second; 0 if the run makes none, or if it is too early to measure."""
         made, seconds = self.done + self.under_way - self.resumed, self.beat - self.begun
         return made / seconds if self.phase == "frames" and made > 0 and seconds > 0 else 0.0
 
@@ -67,7 +67,7 @@ class Heartbeat:
 
     @staticmethod
     def read(file: Path) -> Heartbeat | None:
-        """The one in a file; None where there is none, or none that can be read: it may be gone by now."""
+        """The heartbeat in a file; None if the file is missing or unreadable, for example because it has just been removed."""
         try:
             value: dict[str, Any] = parsed(read_bytes(file, "MAX_RECORD_BYTES"))
             number, of = value["shard"]
@@ -83,8 +83,8 @@ class Heartbeat:
 
 
 class HeartbeatWriter:
-    """Tells of a run, every few seconds by a thread of its own, however long a frame takes. `now` is what it tells next; a shot
-    that is handed out or done changes `working_on`.
+    """Writes a run's report every few seconds, in its own thread, so that slow frames do not delay it. `now` is the next
+    report; `working_on` changes when a shot is handed out or finished.
 
     A monotonic clock measures the time since a phase began, so that rates stay right when the system's time is set.
     """
@@ -107,7 +107,7 @@ class HeartbeatWriter:
         self._thread.join()
 
     def enters(self, phase: str) -> None:
-        """Begin a phase; one that has begun goes on."""
+        """Begin a phase, unless it is already the current one."""
         if phase != self.now.phase:
             self.now, self._phase_begun = replace(self.now, phase=phase), time.monotonic()
 

@@ -1,4 +1,4 @@
-"""Puts files of one data set into another: by hard links where the file system has them."""
+"""Links files of one data set into another: by hard links where the file system supports them."""
 
 from __future__ import annotations
 
@@ -26,8 +26,8 @@ def link_model(
     write: Callable[[Path], None] | None = None,
     **changed: Any,
 ) -> None:
-    """Write a model of these files, and of those that `write` puts into a folder, those that `info` names among them, unless
-    there is one of this key. `changed` are fields of it that become others.
+    """Write a model from these files and those that `write` puts into a folder, unless the key exists. They must include the
+    files named in `info`. `changed` replaces fields of its metadata.
     """
     if store.model_info(key) is not None:
         return
@@ -44,9 +44,10 @@ def link_model(
 def link_shot(
     store: Store, key: str, frames: Iterable[ForeignFrame], known: Iterable[Path] = (), kinds: Files | None = None
 ) -> int:
-    """Write a shot whose channels are files that exist already; gives the number of its frames.
+    """Write a shot whose channels are existing files; return the number of its frames.
 
-    `known` are further files of the shot, as listed by `Store.known_of`; `kinds` say whether its channels come into one file.
+    `known` are further files of the shot, as listed by `Store.known_of`; `kinds` determine whether its channels go into one
+    file.
     """
     target = store.shot_folder(key)
     prefix = target.relative_to(store.root).as_posix()

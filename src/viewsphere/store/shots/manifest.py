@@ -1,4 +1,4 @@
-"""The contents of a finished folder: each file's size and digest, in a file that is written last and proves itself.
+"""The contents of a finished folder: each file's size and digest, in a self-checking file that is written last.
 
     {"files": {"depth/00000012.tiff": [34180, "6f0c..."], ...}, "digest": "91d2..."}
 
@@ -34,7 +34,7 @@ SHARD = "channels.tar"
 """Name of the file that holds all channels of a shot."""
 
 BLOCK = 1 << 20
-"""Bytes of a file that are read at once."""
+"""Number of bytes that are read at a time."""
 
 Seal = tuple[int, str]
 """A file's size in bytes and its digest."""
@@ -55,7 +55,7 @@ def sealed(value: Mapping[str, Any]) -> str:
 
 
 def unsealed(text: str) -> dict[str, Any]:
-    """Return the original argument of `sealed`; raises ValueError for a text that was changed since."""
+    """Return the original argument of `sealed`; raises ValueError if the text was changed."""
     start, comma, _ = text.rpartition(',"digest":"')
     if not comma or f'{start},"digest":"{digest((start + "}").encode())}"}}' != text:
         raise ValueError("a text that was changed since it was written: its digest is another")
@@ -74,9 +74,9 @@ def seal_of(file: Path) -> Seal:
 
 @dataclass(frozen=True)
 class Manifest:
-    """The files of a folder by their paths in it, and those that lie in its shard, as if they lay in the folder.
+    """The files of a folder by their paths, including the files inside its shard as if they were in the folder.
 
-    `painter` is the processor type and the kernel build that painted the pictures, empty where no engine did.
+    `painter` is the processor type and the kernel build that rendered the pictures, empty without an engine.
     """
 
     files: Mapping[str, Seal]
@@ -91,7 +91,7 @@ class Manifest:
 
     @staticmethod
     def read(folder: Path) -> Manifest:
-        """The manifest of a finished folder; raises StoreError where there is none, or it was damaged."""
+        """The manifest of a finished folder; raises StoreError if it is missing or damaged."""
         file = folder / MANIFEST
         try:
             value = unsealed(read_text(file, "MAX_RECORD_BYTES"))
@@ -108,7 +108,7 @@ class Manifest:
             raise StoreError(f"{file}: expected the manifest of a finished folder, found {problem}: {REPAIR}") from None
 
     def write(self, folder: Path) -> None:
-        """Write it into its folder, whose other files are whole."""
+        """Write the manifest into its folder, whose other files are complete."""
         value: dict[str, Any] = {"files": self.files, **({"spans": self.spans} if self.spans else {})}
         value |= {"painter": self.painter} if self.painter else {}
         (folder / MANIFEST).write_text(sealed(value), "utf-8", newline="\n")
@@ -120,12 +120,12 @@ class Manifest:
         return seals_of_files | {path: (size, found) for path, (_, size, found) in self.spans.items()}
 
     def holder(self, path: str) -> str:
-        """The file that holds another, both by their paths in the folder: the shard, or the file itself."""
+        """The file that contains another one: the shard, or the file itself; both as paths in the folder."""
         return SHARD if path in self.spans else path
 
     def content(self, path: str, holder: Path) -> bytes:
-        """The bytes of a file, by its path in the folder, and where its holder lies. Raises StoreError where they are not those
-        that were written, OSError where they cannot be read.
+        """The bytes of the file at `path` in the folder; `holder` is the path of its holder. Raises StoreError if they changed
+        since they were written, OSError if they cannot be read.
         """
         if path not in self.spans:
             data = read_bytes(holder, "MAX_PICTURE_BYTES")
@@ -139,7 +139,7 @@ class Manifest:
         return data
 
     def check(self, path: str, data: bytes, file: Path) -> None:
-        """Raises StoreError where the bytes of a file, by its path in the folder, are not those that were written."""
+        """Raise StoreError if the bytes of the file at `path` in the folder changed since they were written."""
         seal = self.files.get(path)
         if seal != (len(data), digest(data)):
             raise StoreError(f"{file}: expected {said(seal)}, found {said((len(data), digest(data)))}: {REPAIR}")
@@ -165,14 +165,14 @@ class Manifest:
 
 
 KNOWN = ("model.json", "shot.json", "scenery.json")
-"""Files that say what a folder's others are made of."""
+"""Files that describe the content of a folder's other files."""
 
 
 def refuse_another(damaged: Path, again: Path) -> None:
-    """Raise StoreError where a folder that was made again is not equal to what the damaged one is known to have been.
+    """Raise StoreError if a folder that was made again differs from the known original content of the damaged one.
 
-    That is what its manifest says, or where that was damaged, too, what its files say that can be read. Where all files fit
-    the manifest, and are wrong all the same, nothing is known.
+    The original content is known from its manifest or, if that is damaged too, from its readable files. It is unknown if all
+    files match the manifest but are wrong nevertheless.
     """
     try:
         manifest = Manifest.read(damaged)

@@ -1,9 +1,8 @@
-"""Puts a file or a folder in its place in one step, on Windows too; and keeps it there when the machine crashes, if asked to.
+"""Moves a file or a folder into place in one step, on Windows too; on request, it also survives a crash of the machine.
 
-A file system writes what it was given when it likes, and in any order: after a crash of the machine (not of a program) a folder
-may be in its place whose files are empty, or one is gone that was seen before. With `VIEWSPHERE_DURABILITY=fsync` the files
-are written to the disk before they are moved, and the folders that lead to them afterwards: what is there then is whole, and
-what was finished is there.
+A file system delays and reorders writes: after a crash of the machine (not of a program), a folder may exist whose files are
+empty, or a finished folder may be missing. With `VIEWSPHERE_DURABILITY=fsync`, files are flushed to the disk before they are
+moved, and their parent folders afterwards: existing folders are then complete, and finished ones exist.
 """
 
 from __future__ import annotations
@@ -19,17 +18,18 @@ from pathlib import Path
 from viewsphere.errors import UserError
 
 DURABILITY = "VIEWSPHERE_DURABILITY"
-"""The variable that asks for it; processes that are started meanwhile have it, too."""
+"""The environment variable that requests durability; child processes inherit it."""
 
 DURABILITIES = ("none", "fsync")
 """Values of the variable; the first is the default."""
 
 AT_ONCE = 8
-"""Files that are written to the disk at once, which then does so together: a quarter of the time of one after another."""
+"""Number of files that are flushed in parallel, which takes a quarter of the time of flushing one by one."""
 
 WAITS_S = (0.02, 0.05, 0.1, 0.2, 0.4, 0.8) if os.name == "nt" else ()
-"""Seconds before each further try. Windows refuses to move what another program has open, and virus scanners and indexers
-open what was just written."""
+"""Seconds before each further try. Windows refuses to move files that another program has open, and virus scanners and indexers
+open new files.
+"""
 
 NOT_OURS = {errno.EACCES, errno.EPERM, errno.EINVAL, errno.ENOTSUP, errno.EOPNOTSUPP}
 """Errors for folders that we may not flush to the disk, or that their file system cannot flush, such as automatic mounts."""
@@ -44,9 +44,9 @@ def durability() -> str:
 
 
 def move(source: Path, target: Path) -> None:
-    """Rename `source`; a file that is `target` gives way to it, a folder does not.
+    """Rename `source`; it replaces a file at `target`, but not a folder.
 
-    Raises OSError; where refusals pass (`WAITS_S`), after the last try.
+    Raises OSError; for temporary refusals, after the last try (`WAITS_S`).
     """
     write_through(source)
     _rename(source, target)
@@ -56,7 +56,9 @@ def move(source: Path, target: Path) -> None:
 
 
 def write_through(path: Path) -> None:
-    """Have the disk keep a file, or a folder with all that is in it, its entries last, if that is asked for; raises OSError."""
+    """Flush a file, or a folder with its content and then its entries, to the disk, if durability is requested; raises
+    OSError.
+    """
     if durability() != "fsync":
         return
     if not path.is_dir():
@@ -81,7 +83,7 @@ def _rename(source: Path, target: Path) -> None:
 
 
 def _write_entries(folder: Path) -> None:
-    """Have the disk keep which names are in a folder, where that is ours to ask for."""
+    """Flush a folder's entries to the disk, where that is permitted."""
     if os.name != "nt":  # which keeps them with the files
         try:
             _sync(folder)

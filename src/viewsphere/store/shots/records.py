@@ -33,7 +33,7 @@ from viewsphere.validation.errors import first_of
 STORE_VERSION = 3
 
 MOST_FRAMES = 2**53
-"""Frames of a data set: larger numbers would not be exact in everybody's JSON."""
+"""Largest number of frames of a data set: not all JSON readers store larger numbers exactly."""
 
 PRODUCT = "product"
 """The sampler of models x poses."""
@@ -42,7 +42,7 @@ IMPORT = "import"
 """The sampler's name in data sets with imported pictures."""
 
 KEEP = "keep_annotations_above"
-"""The field of recipes that says which annotations exports leave out."""
+"""The field of recipes that determines the annotations that exports leave out."""
 
 
 _STRICTLY = ConfigDict(extra="forbid", allow_inf_nan=False)
@@ -61,7 +61,7 @@ Box3d = Annotated[NDArray[np.float64], PlainValidator(_box)]
 
 
 class OtherStoreError(Exception):
-    """A store whose layout is of another version."""
+    """A store with the layout of another version."""
 
 
 @dataclass(frozen=True)
@@ -80,12 +80,11 @@ class ModelInfo:
     """A normalised model of the data set; paths are relative to its root.
 
     `box3d_object` (8, 3) metres in the object's axes; sizes are (width, height, length) in metres; `diameter` is the largest
-    distance between two vertices, metres, None where older versions made the record; `symmetries` and `keypoints` are those
-    of the model file, or measured (`ModelMetadata`); `looks` is its appearance, None where no label needs it. A
-    model that deforms has the same of each of its `steps`, ascending, whose `track` is its key; its own fields are those of its
-    file's first frame.
+    distance between two vertices, metres, None in records of older versions; `symmetries` and `keypoints` come from the model
+    file, or are measured (`ModelMetadata`); `looks` is its appearance, None if no label needs it. A model that deforms has a
+    record for each of its `steps`, ascending, whose `track` is its key; its own fields describe its file's first frame.
 
-    `parts`, `materials` and `body_parts` are names: those of the numbers 1, 2, ... in maps of these names.
+    `parts`, `materials` and `body_parts` name the numbers 1, 2, ... in the maps of these names.
     """
 
     __pydantic_config__ = _STRICTLY
@@ -133,14 +132,14 @@ class ModelInfo:
         return step_info
 
     def moved(self, key: str, prefix: str, **changed: Any) -> ModelInfo:
-        """The same model of another key, whose files lie in the folder `prefix`; `changed` are other fields of it."""
+        """The model with another key, its files in the folder `prefix`; `changed` replaces further fields."""
         obj, glb = (f"{prefix}/{PurePosixPath(file).name}" for file in (self.obj, self.glb))
         keys = (step_key(key, step.step and step.step.frame) for step in self.steps)
         steps = (replace(step.moved(own, prefix, **changed), track=key) for step, own in zip(self.steps, keys, strict=True))
         return replace(self, key=key, obj=obj, glb=glb, steps=tuple(steps), **changed)
 
     def to_plain(self) -> dict[str, Any]:
-        """The record as JSON has it."""
+        """The record as plain JSON data."""
         value: dict[str, Any] = {**self.__dict__, "box3d_object": self.box3d_object.tolist()}
         if self.step is None:
             del value["step"], value["steps"], value["track"]
@@ -163,7 +162,7 @@ class ModelInfo:
 
     @staticmethod
     def from_plain(value: Mapping[str, Any]) -> ModelInfo:
-        """The record that `to_plain` was asked of; raises LookupError, TypeError or ValueError for anything else."""
+        """The record from the result of `to_plain`; raises LookupError, TypeError or ValueError for other data."""
         info = typed(_model_adapter(), value)
         for part in (info, *info.steps):
             names([part.key, *([part.track] if part.track else [])], "the key")
@@ -174,13 +173,13 @@ class ModelInfo:
 class Part:
     """The samples [first, first + frames) that one recipe, or one source of a merge, has added to the data set.
 
-    `blocks` say what each of its samples shows, in order: the subjects of its sampler (models, or scenes) and the numbers of
-    their poses.
-    `supplies`: (number of an earlier part, channels) that this one added to all frames of that part; they lie in shots
-    of their own. `shot_frames`: most positions of a shot. `settings`: digests of what frames that are appended have to share.
-    `new_poses`: how many poses no earlier part had; `pose_names`: their digests (see `planning.extension`), None where they
-    follow from the recipe. `dealt_splits`: where splits are by model or by scene, the split of each that no earlier part had.
-    `merged`: the part came from another data set, where its shots and models may have had other names and numbers.
+    `blocks` list the content of its samples, in order: the subjects of its sampler (models, or scenes) and the numbers of their
+    poses. `supplies`: (number of an earlier part, channels) that this one added to all frames of that part; they are in
+    separate shots. `shot_frames`: most positions of a shot. `settings`: digests of the settings that appended frames must
+    share. `new_poses`: number of poses that no earlier part had; `pose_names`: their digests (see `planning.extension`), None
+    if they follow from the recipe. `dealt_splits`: for splits by model or by scene, the splits of models or scenes that no
+    earlier part had. `merged`: the part came from another data set, where its shots and models may have had other names and
+    numbers.
     """
 
     digest: str
@@ -224,11 +223,11 @@ class Part:
 
     @property
     def is_sampled(self) -> bool:
-        """Return whether a recipe made it: its subjects, models or scenes, are taken from known poses."""
+        """Return whether a recipe made the part: its subjects, models or scenes, have known poses."""
         return self.sampler != IMPORT and bool(self.blocks)
 
     def checked(self) -> Part:
-        """Itself; raises ValueError for numbers and names that no part has."""
+        """The part itself; raises ValueError for invalid numbers and names."""
         for block in self.blocks:
             names(block.subjects, "the name")
         if any(b.each < 1 or any(not 0 <= a < z for a, z in b.positions) for b in self.blocks):
@@ -249,12 +248,12 @@ class Part:
 
 
 NAME_BYTES = 8
-"""Of a pose's name in `Part.pose_names`; zeros are that of no pose a recipe can mean."""
+"""Length of a pose's digest in `Part.pose_names`; zeros mark a pose that no recipe can express."""
 
 
 @dataclass(frozen=True)
 class PlanRecord:
-    """The content of `plan.json`: all that readers of the data set need to know of the plan.
+    """The content of `plan.json`: the facts of the plan that readers of the data set need.
 
     `parts` were rendered or imported one after another; a data set rendered once has one. Version, digest, name and recipe are
     the last part's; all other fields hold for all parts together.
@@ -285,7 +284,7 @@ class PlanRecord:
         return self.recipe.get(KEEP)
 
     def keeping_above(self, least: float | None) -> PlanRecord:
-        """The same frames, with exports that keep annotations of what is seen more than this; None: they keep all."""
+        """The plan with exports that keep annotations above this visibility; None: they keep all."""
         parts = tuple(replace(p, recipe=_keeping(p.recipe, least)) if p.is_sampled else p for p in self.parts)
         return replace(self, recipe=_keeping(self.recipe, least), parts=parts)
 
@@ -320,7 +319,7 @@ class PlanRecord:
         return None if small and not number else number
 
     def part_with(self, digest: str) -> int | None:
-        """Number of the last part that a recipe of this digest brought, None if there is none."""
+        """Number of the last part from a recipe with this digest, None if there is none."""
         return next((i for i in reversed(range(len(self.parts))) if self.parts[i].digest == digest), None)
 
     def channels_of(self, part: int) -> tuple[str, ...]:
@@ -435,7 +434,7 @@ def _plan_adapter() -> TypeAdapter[PlanRecord]:
 
 
 def typed(kind: TypeAdapter[Record], value: Any) -> Record:
-    """The record whose fields are these, as JSON gives them back; raises ValueError, in one line, for fields of other types."""
+    """The record with these fields, as read from JSON; raises ValueError, in one line, for fields of other types."""
     try:
         return kind.validate_python(value)
     except ValidationError as error:

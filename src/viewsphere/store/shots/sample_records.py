@@ -1,7 +1,7 @@
 """Samples, without their channels, as plain JSON and back, exactly.
 
-A rendered sample is kept beside its shot by a short record, which holds only those values of the objects that do not follow
-from the shot and the models. An imported sample is kept by a whole record.
+A rendered sample is stored with its shot as a short record, which holds only the values of objects that do not follow from the
+shot and the models. An imported sample is stored as a whole record.
 """
 
 from __future__ import annotations
@@ -57,7 +57,7 @@ def _plain_extra(sample: Sample) -> dict[str, Any]:
 
 
 def _extra(requested: Sequence[str], plain: Mapping[str, Any]) -> dict[str, Any]:
-    """The fields that `_plain_extra` wrote, of the requested labels."""
+    """The fields of the requested labels, from the result of `_plain_extra`."""
     fields = (field for label in sample_labels_of(requested) for field in label.fields)
     return {field.name: field.value(plain[field.name]) for field in fields}
 
@@ -115,7 +115,7 @@ _PICTURE = TypeAdapter(_Picture)
 
 
 def from_whole_sample(record: Mapping[str, Any], channels: Channels, files: Mapping[str, str]) -> Sample:
-    """The sample a whole record was made of, with these channels and files; every number is equal to the last bit."""
+    """The sample of a whole record, with these channels and files; every number is equal to the last bit."""
     camera, pose, labels, picture = record["camera"], record["pose"], object_labels(), typed(_PICTURE, record)
     finite(picture.source)
     return Sample(
@@ -171,11 +171,11 @@ class ShotRecords:
         return Makers(makers(), labels_of(self.shot.annotations), self.shot.annotations, self.where)
 
     def kept(self, place: int) -> tuple[str, ...]:
-        """The channels of the shot's that the sample at a place has, counted from 0."""
+        """The shot's channels that the sample at a place, counted from 0, has."""
         return self.shot.kept(self._samples[place][2])
 
     def keeps(self, place: int, channel: str) -> bool:
-        """Return whether a channel, that may have been added later, is one of the sample's sensor."""
+        """Return whether the sample's sensor keeps a channel, which may have been added later."""
         own = self.shot.rig.sensors[self._samples[place][2]].channels
         return own is None or channel in own
 

@@ -17,8 +17,8 @@ from viewsphere.urls import link_file
 
 
 class ShotFiles:
-    """The folder of a shot that is being made: its channels are put there while the block lasts, and all else; then it gets its
-    manifest, if the block ends well, which names the `painter`.
+    """The folder of an unfinished shot, which receives its channels and other files during the block. If the block succeeds, it
+    gets its manifest, which names the `painter`.
     """
 
     def __init__(self, folder: Path, kinds: Files, painter: str = "") -> None:
@@ -37,7 +37,7 @@ class ShotFiles:
             self._manifest().write(self._folder)
 
     def add(self, inside: str, data: bytes) -> None:
-        """Put a channel's file of these bytes there, by its path in the folder; raises ValueError for a second one there."""
+        """Write a channel's file with these bytes to its path in the folder; raises ValueError if the path is taken."""
         if self._shard:
             self._shard.add(inside, data)
         else:
@@ -45,9 +45,7 @@ class ShotFiles:
             self._seals[inside] = len(data), digest(data)
 
     def link(self, inside: str, file: Path) -> None:
-        """Put a channel's file there that is on a disk, or at a URL, already; by a hard link where that is possible. Errors as
-        for `add`.
-        """
+        """Add a channel's file that exists on a disk or at a URL; by a hard link where possible. Errors as for `add`."""
         if self._shard:
             self._shard.add(inside, read_bytes(file, "MAX_PICTURE_BYTES"))
         else:
@@ -106,7 +104,7 @@ def _second(inside: str) -> ValueError:
 
 
 def _write(file: Path, data: bytes) -> None:
-    """Write a new file; Python's own file objects take as long again as the disk does for a small one."""
+    """Write a new file; for small files, Python's file objects would double the time."""
     descriptor = os.open(file, os.O_WRONLY | os.O_CREAT | os.O_TRUNC | getattr(os, "O_BINARY", 0), 0o666)
     try:
         left = memoryview(data)

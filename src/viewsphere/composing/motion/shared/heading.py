@@ -13,10 +13,10 @@ from viewsphere.composing.motion.shared.start import Pose
 Float = NDArray[np.float64]
 
 Heading = Literal["keep", "level", "along"]
-"""keep: turned as before; level: about the vertical alone, upright; along: uphill and downhill, too."""
+"""keep: unchanged; level: turned about the vertical only, upright; along: also tilted uphill and downhill."""
 
 LEVEL = 1e-9
-"""Length of a unit vector's level part below which the vector is vertical, and ahead has no azimuth."""
+"""Length of a unit vector's horizontal part below which the vector counts as vertical, without an azimuth."""
 
 
 def headed(pose: Pose, direction: ArrayLike, heading: Heading) -> Pose:

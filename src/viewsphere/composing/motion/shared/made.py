@@ -1,4 +1,4 @@
-"""From what a recipe says of motions to where a thing is at each instant."""
+"""From a recipe's motions to the pose of a thing at each instant."""
 
 from __future__ import annotations
 
@@ -31,8 +31,8 @@ DIGITS = 10
 
 
 def check_motions(recipe: Recipe) -> None:
-    """Raise RecipeError for the first of a recipe's motions that cannot be: without `time`, or as `check_motion` says; or
-    for a clip that nothing plays.
+    """Raise RecipeError for the first invalid motion of a recipe: one without `time`, one that `check_motion` refuses, or a
+    clip that nothing plays.
     """
     for field, motions in _all_motions(recipe):
         if recipe.time is None:
@@ -42,7 +42,7 @@ def check_motions(recipe: Recipe) -> None:
 
 
 def _check_clips(recipe: Recipe) -> None:
-    """A clip that is named is played: by the model, or by its company."""
+    """Check that every named clip is played, by the model or by its company."""
     company = recipe.scene.company
     for i, entry in enumerate(recipe.models):
         playing = (entry.motion, None if company is None else company.motion)
@@ -71,7 +71,7 @@ def _all_motions(recipe: Recipe) -> Iterator[tuple[str, Motions]]:
 
 
 def check_motion(motions: Motions | None, field: str) -> None:
-    """Raise RecipeError, which begins with the field, for a kind that is not known, and for options that it does not have."""
+    """Raise RecipeError, which begins with the field, for an unknown kind or option."""
     for where, entry in listed(motions, field):
         _options(entry, where)
 
@@ -84,7 +84,7 @@ class Mover:
     moves: tuple[Move, ...]
 
     def state(self, time: float) -> tuple[Matrix4 | None, TimeStep | None]:
-        """World from object at a time, seconds, to 1e-10 m, None where it is not there; and what it shows of its file."""
+        """World from object at a time, seconds, to 1e-10 m, None where the thing is absent; and the time step of its file."""
         pose = self._at(time)
         return (None, None) if pose is None else (_recorded(pose, self.start.placed), pose.step)
 
@@ -112,7 +112,9 @@ def mover(motions: Motions | None, start: Start) -> Mover:
 
 
 def _moves(motions: Motions | None, start: Start) -> Iterator[Move]:
-    """The motions one by one, everything drawn; draws are named by the kind, and by how often it came before."""
+    """The motions one by one, with all values drawn; draws are seeded by the kind, and by the number of earlier motions of this
+    kind.
+    """
     seen: Counter[str] = Counter()
     for field, entry in listed(motions, start.field):
         seen[entry.kind] += 1
@@ -131,7 +133,7 @@ def _move(entry: MotionEntry, start: Start) -> Move:
 
 
 def _between(entry: MotionEntry, move: Move, generator_of: RngOf) -> Move:
-    """The motion of a thing that is there from when it enters until it leaves."""
+    """The motion of a thing that is present from its entry until it leaves."""
     if entry.enter is None and entry.leave is None:
         return move
     enter, leave = drawn(entry.enter, generator_of, ("enter",)), drawn(entry.leave, generator_of, ("leave",))
@@ -144,7 +146,7 @@ def _between(entry: MotionEntry, move: Move, generator_of: RngOf) -> Move:
 
 
 def _options(entry: MotionEntry, field: str) -> tuple[MotionSpec, Any]:
-    """The motion of an entry's kind, and the entry's options as it reads them."""
+    """The motion of an entry's kind, and the entry's options in its class."""
     known = plugins.names("motions")
     if entry.kind not in known:
         raise RecipeError(f"{field}.kind: {one_of(entry.kind, known)}")
@@ -153,7 +155,7 @@ def _options(entry: MotionEntry, field: str) -> tuple[MotionSpec, Any]:
 
 
 def _recorded(pose: Pose, placed: Matrix4) -> Matrix4:
-    """The pose as plain data, as it was placed where it is not moved."""
+    """The pose as plain data; the placed pose if the thing was not moved."""
     if (pose.matrix == np.array(placed)).all():
         return placed
     rows: Any = tuple(map(tuple, (np.round(pose.matrix, DIGITS) + 0.0).tolist()))
@@ -161,7 +163,7 @@ def _recorded(pose: Pose, placed: Matrix4) -> Matrix4:
 
 
 def _lasting(steps: Sequence[TimeStep | None]) -> list[TimeStep | None]:
-    """The steps, each lasting until the next one; what is not there at first shows already what it will show."""
+    """The steps, each lasting until the next one; a thing absent at first has its first step from the start."""
     shown = next((step for step in steps if step is not None), None)
     lasting: list[TimeStep | None] = []
     for step in steps:
@@ -171,5 +173,5 @@ def _lasting(steps: Sequence[TimeStep | None]) -> list[TimeStep | None]:
 
 
 def _one(values: Sequence[T]) -> tuple[T, ...]:
-    """The values, or one of them where they are equal."""
+    """The values, or a single one if all are equal."""
     return tuple(values[:1]) if all(value == values[0] for value in values) else tuple(values)

@@ -44,7 +44,7 @@ class Pose:
         return replace(self, matrix=rigid(self.matrix[:3, :3], (x, y, z + self.matrix[2, 3])))
 
     def facing(self, rotation: ArrayLike) -> Pose:
-        """Turned as a rotation (3, 3), world from object, says, its origin staying where it is."""
+        """Turned to a rotation (3, 3), world from object, its origin staying where it is."""
         return replace(self, matrix=rigid(rotation, self.matrix[:3, 3]))
 
 
@@ -71,5 +71,5 @@ class Start:
     way: Callable[[float], Matrix4] | None = None
 
     def playing(self, timeline: Timeline | None, field: str) -> Start:
-        """The same of a thing whose file has this timeline, and whose motion stands in this field of the recipe."""
+        """The start for a thing whose file has this timeline, and whose motion is in this field of the recipe."""
         return replace(self, timeline=timeline, field=field)

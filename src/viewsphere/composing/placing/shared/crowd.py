@@ -17,13 +17,15 @@ CELLS = 1024
 """Cells along the side of a map: 1,000 chairs have cells of 6 cm, and a thousand things are marked in 0.1 s."""
 
 FINE = 0.25
-"""Least side of a cell, as a share of the narrowest thing's inner radius: finer ones prove hardly more spots taken."""
+"""Least side of a cell, as a share of the narrowest thing's inner radius: finer cells find hardly more taken spots."""
 
 LEAST = 1e-4
-"""Metres of the least cell and inner radius: nothing thinner is marked."""
+"""Smallest cell and inner radius, metres: nothing thinner is marked."""
 
 SURE = 1e-6
-"""Metres by which a spot has to be too near before it counts as taken unseen: far above the rounding of either computation."""
+"""Safety margin, metres: a spot must be too near by more than this to count as taken without an exact test; far above rounding
+errors.
+"""
 
 
 @dataclass(eq=False)
@@ -56,8 +58,9 @@ def inner_class(radius: float) -> float:
 
 @dataclass(frozen=True, eq=False)
 class TakenMap:
-    """A map of the floor around the middle: cells in which no further thing can have its middle, as it would be nearer to
-    another than the gap. slim: the inner radius of these things, at least; reach: metres from the middle to the map's edges.
+    """A map of the floor around the middle: cells that cannot hold the middle of another thing, because it would be nearer to
+    an existing one than the gap. slim: the least inner radius of these things; reach: metres from the middle to the map's
+    edges.
     """
 
     gap: float
@@ -68,14 +71,14 @@ class TakenMap:
 
     @classmethod
     def of(cls, gap: float, slim: float, reach: float) -> TakenMap:
-        """A map on which nothing stands."""
+        """An empty map."""
         cell = max(2 * reach / CELLS, FINE * slim, LEAST)
         count = min(int(2 * reach / cell) + 1, CELLS)
         return cls(gap, slim, cell, count * cell / 2, np.zeros((count, count), np.bool_))
 
     def add(self, cover: Footprint | Outline) -> None:
-        """Mark the cells that lie too near to a cover as a whole."""
-        far = self.slim + self.gap - SURE - 0.7072 * self.cell  # from a cell's middle, as its corners lie beyond
+        """Mark the cells that are entirely too near to a cover."""
+        far = self.slim + self.gap - SURE - 0.7072 * self.cell  # from a cell's middle, because its corners are farther away
         corners = cover.corners
         low = np.maximum(np.floor((corners.min(axis=0) - far + self.reach) / self.cell).astype(int), 0)
         high = np.minimum(np.ceil((corners.max(axis=0) + far + self.reach) / self.cell).astype(int), len(self.taken))
@@ -86,7 +89,7 @@ class TakenMap:
         self.taken[low[0] : high[0], low[1] : high[1]] |= _are_near(points, corners, far)
 
     def are_taken(self, middles: Float) -> NDArray[np.bool_]:
-        """True for middles (N, 2) of things that surely are too near to another."""
+        """True for middles (N, 2) of things that are certainly too near to another."""
         cells = np.floor((middles + self.reach) / self.cell)
         is_beyond = ((cells < 0) | (cells >= len(self.taken))).any(axis=1)
         cells[is_beyond] = 0

@@ -1,4 +1,4 @@
-"""Things that are let go and come to rest, as several placers drop them."""
+"""Things that are dropped and come to rest, for several placers."""
 
 from __future__ import annotations
 
@@ -37,36 +37,36 @@ SETTINGS = {
     "resolution": 1000,
     "seed": 1,
 }
-"""coacd's own settings take up to thirty times as long, and nothing comes to rest better."""
+"""coacd's defaults take up to thirty times as long, without better results at rest."""
 
 
 Float = NDArray[np.float64]
 
 TRIES = 10
-"""Draws of a fall, of which the first that ends well is taken."""
+"""Number of draws of a fall; the first valid one is used."""
 
 HASTY_S = 5.0
-"""Simulated seconds that all tries but the last have to come to rest: most need half of them, and another draw is sooner
-at rest than one in which something trembles on and on.
+"""Simulated seconds to come to rest, for all tries but the last: most need half of them, and another draw is faster than
+waiting for something that trembles on.
 """
 
 ROUNDS = 2
-"""Times that things which missed are dropped again, for each of the cast."""
+"""How often things that missed are dropped again, per thing of the cast."""
 
 SPOTS = 12
-"""Spots that are tried for each thing that is let go; the lowest is taken."""
+"""Number of tried spots for each dropped thing; the lowest is used."""
 
 MOST_OVERLAP = 0.002
-"""Metres that two things may overlap at rest."""
+"""Largest overlap of two things at rest, metres."""
 
 CLEAR = 0.001
-"""The same of things that are caught in flight, where some hit others."""
+"""Largest overlap of things caught in flight, where some hit others, metres."""
 
 FENCE, GAP = 50.0, 0.001
 """Height of fences, in lengths of the longest thing, and their distance from dropped things, metres."""
 
 RECORDED = 5
-"""Steps of the simulation between two states of a way."""
+"""Simulation steps between two states of a path."""
 
 
 class Matter(Frozen):
@@ -117,11 +117,11 @@ class Drop:
         return float(np.median([shape.length for shape in self.shapes]))
 
     def rested(self) -> dict[str, Any]:
-        """Plain data: `poses` of all at rest, and, where the room asks how they moved, `ways`: seconds and states."""
+        """Plain data: `poses` of all things at rest and, if the room needs their paths, `ways`: seconds and states."""
         return self._best("rest")
 
     def caught(self) -> dict[str, Any]:
-        """The same of things that are caught while they fall, at a moment before the last one lands."""
+        """The same data for things caught while they fall, at a moment before the last one lands."""
         return self._best("mid")
 
     def _best(self, moment: str) -> dict[str, Any]:
@@ -159,8 +159,8 @@ class Drop:
         return replace(within, half=np.maximum(within.half, reach + GAP))
 
     def _kept(self, world: World, number: str, places: Sequence[tuple[Float, float]], longest_s: float) -> bool:
-        """Let time go by until all are at rest where they have to stay; whether they are at rest. What leaves is let go
-        again at once, before it rolls away, and what lies too high when it is at rest.
+        """Simulate until all things are at rest in their region, and return whether they are. Things that leave the region are
+        dropped again at once, before they roll away; things that are too high are dropped again when they are at rest.
         """
         again, most = 0, ROUNDS * len(self.cast)
 
@@ -212,12 +212,12 @@ class Drop:
         return [shape.hull] if self.options.collide == "hulls" else _convex_parts(shape)
 
     def _spheres(self, slot: int) -> tuple[Float, float]:
-        """Middle (3,) and radius of a ball around a thing, its own axes."""
+        """Centre (3,) and radius of a ball around a thing, in its own axes."""
         box = self.shapes[slot].box
         return box.mean(axis=0), float(np.linalg.norm(box[0] - box.mean(axis=0)))
 
     def _lying(self, world: World, without: Sequence[int]) -> list[tuple[Float, float]]:
-        """Balls around what lies there, world axes."""
+        """Balls around the things that are already there, world axes."""
         found: list[tuple[Float, float]] = []
         for i, pose in enumerate(world.poses):
             if i not in without:
@@ -246,7 +246,7 @@ class Drop:
         return poses
 
     def _beside(self, world: World, height: float) -> list[int]:
-        """Numbers of things whose middle is not over where they have to stay, or of which all is higher than this."""
+        """Numbers of things whose middle is not over their region, or whose lowest point is above this height."""
         within = self.ground.within
         if within is None:
             return []
@@ -275,20 +275,20 @@ class _Film:
 
     @property
     def ways(self) -> dict[str, Any]:
-        """Until all is at rest."""
+        """The paths until all things are at rest."""
         count = bisect_right(self._seconds, self._world.seconds)
         states = np.round(np.array(self._states[:count]), 6) + 0.0
         return {"seconds": np.round(self._seconds[:count], 6).tolist(), "states": states.transpose(1, 0, 2).tolist()}
 
 
 def ways_of(made: dict[str, Any]) -> list[Way]:
-    """The ways in plain data."""
+    """The paths stored in plain data."""
     seconds = tuple(made["ways"]["seconds"])
     return [Way(seconds, tuple(map(tuple, states))) for states in made["ways"]["states"]]
 
 
 def poses_of(made: dict[str, Any]) -> list[Matrix4]:
-    """The poses in plain data."""
+    """The poses stored in plain data."""
     poses: list[Any] = [tuple(map(tuple, pose)) for pose in made["poses"]]
     return poses
 
@@ -309,7 +309,7 @@ def _clear(spot: Float, radius: float, balls: Sequence[tuple[Float, float]], low
 
 
 def _turned(middle: Float, at: tuple[float, float, float], turn: float) -> Matrix4:
-    """A pose turned about the vertical whose middle is there."""
+    """A pose turned about the vertical, with its middle at `at`."""
     c, s = math.cos(turn), math.sin(turn)
     x, y, z = at[0] - c * middle[0] + s * middle[1], at[1] - s * middle[0] - c * middle[1], at[2] - middle[2]
     return ((c, -s, 0.0, float(x)), (s, c, 0.0, float(y)), (0.0, 0.0, 1.0, float(z)), (0.0, 0.0, 0.0, 1.0))
@@ -328,8 +328,8 @@ def _fences(around: Footprint, height: float) -> list[Board]:
 
 
 def _convex_parts(shape: Shape) -> list[Float]:
-    """Corners (N, 3) of the convex parts of a model, by CoACD (Wei et al. 2022), which together cover it: they are kept in the
-    cache by the mesh's digest. Raises ModelError if the model's file cannot be used, MissingExtraError without coacd.
+    """Corners (N, 3) of the convex parts of a model, by CoACD (Wei et al. 2022); together they cover the model. They are cached
+    by the mesh's digest. Raises ModelError if the model's file cannot be used, MissingExtraError without coacd.
     """
     if shape.surface is None:
         return [shape.hull]

@@ -19,14 +19,15 @@ Float = NDArray[np.float64]
 
 
 FAR = 2.000001  # a little above 2, as radii are rounded
-"""Circles around two rectangles that are sqrt(2) times as far apart as they reach, and a gap, are separated by it along a side:
-the sides of a rectangle are at right angles, so that one of them is within 45 degrees of every direction."""
+"""Factor for rectangles: if the distance of two centres is sqrt(2) times the sum of both radii and a gap, a side separates the
+rectangles by the gap, because one side of a rectangle is within 45 degrees of every direction.
+"""
 
 
 class Circle(NamedTuple):
     """The middle of a cover, metres; radii of a circle around it and of one within it.
 
-    Two covers are apart by a gap if their middles are `spread` times as far apart as the outer radii and the gap reach.
+    Two covers are apart by a gap if the distance of their middles is `spread` times the sum of the outer radii and the gap.
     """
 
     x: float
@@ -85,7 +86,7 @@ class Footprint:
         return Circle(self.sides.x, self.sides.y, self.sides.radius, min(self.sides.half), math.sqrt(FAR))
 
     def contains(self, other: Footprint | Outline) -> bool:
-        """Return whether all of the other lies in this one."""
+        """Return whether the other footprint is entirely inside this one."""
         return bool((np.abs((other.corners - self.center) @ self.axes.T) <= self.half + 1e-9).all())
 
     @property
@@ -102,9 +103,7 @@ class Outline:
     corners: Float
 
     def apart(self, other: Outline, gap: float) -> bool:
-        """Return whether a side of one of the two separates them by at least `gap`: then nothing of them is nearer than
-        that.
-        """
+        """Return whether a side of one outline separates the two by at least `gap`; then no parts of them are nearer."""
         for polygon in (self, other):
             a, b = self.corners @ polygon.axes.T, other.corners @ polygon.axes.T
             between = np.maximum(a.min(axis=0) - b.max(axis=0), b.min(axis=0) - a.max(axis=0))
@@ -120,7 +119,9 @@ class Outline:
 
     @cached_property
     def circle(self) -> Circle:
-        """The circles around and within it. Every direction is within half the widest angle between two sides of a normal."""
+        """The circles around and within it. The widest angle between two sides limits the angle from any direction to the
+        nearest normal to half of it.
+        """
         middle = self.corners.mean(axis=0)
         outer = float(np.linalg.norm(self.corners - middle, axis=1).max())
         inner = float(((self.corners - middle) * self.axes).sum(axis=1).min())
@@ -131,7 +132,8 @@ class Outline:
 
 
 def first_crowded(prints: Sequence[Footprint], gap: float, start: int = 0) -> tuple[int, int] | None:
-    """The first two that are not `apart` by a gap: (i, j), j < i, start <= i, the smallest i and then j; None where all are.
+    """The first pair that is not `apart` by a gap: (i, j), j < i, start <= i, with the smallest i and then j; None if all are
+    apart.
 
     A sweep along the longer axis of all: only those whose circles meet along it are compared.
     """
@@ -165,7 +167,7 @@ def footprint(box: Float, world_from_object: Matrix4) -> Footprint:
 def standing(box: Float, x: float = 0.0, y: float = 0.0, azimuth_deg: float = 0.0) -> Matrix4:
     """World from object for a model with this box (8, 3) that stands on the floor, its origin above (x, y), metres.
 
-    Its front faces the azimuth: where a camera of that azimuth stands.
+    Its front faces a camera at this azimuth.
     """
     quarters, rest = divmod(azimuth_deg, 90.0)
     c, s = math.cos(math.radians(azimuth_deg)), math.sin(math.radians(azimuth_deg))

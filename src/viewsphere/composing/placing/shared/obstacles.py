@@ -13,19 +13,19 @@ CELLS = 1024
 """Cells along the longer side of a grid: 1 cm for 10 m, as fine as gaps that recipes ask for."""
 
 FINE = 0.08
-"""Metres of the widest cell: a grid that reaches farther than 40 m has more cells, so that gaps between parked cars stay."""
+"""Largest cell, metres: grids of more than 40 m have more cells instead, so that gaps between parked cars remain visible."""
 
 MOST_CELLS = 8192
 """Most cells along a side, however far a layout reaches: 64 MiB while the grid is drawn."""
 
 REACH = 20.0
-"""Metres from the middle within which the mesh counts at least; a layout that reaches farther says so."""
+"""Least radius around the middle, in metres, within which the mesh is used; layouts that reach farther pass their own."""
 
 STEP = 0.02
 """Metres above the floor up to which a mesh is floor: carpets, sills and the slope of a floor that is nearly level."""
 
 FREE = 0.01
-"""Share of the grid that has to be free. A mesh that leaves less, such as a hilly ground, says nothing of where things fit."""
+"""Share of the grid that must be free. A mesh that leaves less, such as hilly ground, is ignored."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,7 +37,7 @@ class Obstacles:
     filled: NDArray[np.bool_]
 
     def meets(self, corners: Float, gap: float) -> bool:
-        """Return whether a convex polygon (N, 2), counter-clockwise or not, is nearer than a gap to what the place fills."""
+        """Return whether a convex polygon (N, 2), in either order, is nearer than a gap to the filled cells."""
         low, high = ((edge - self.corner) / self.cell for edge in (corners.min(axis=0) - gap, corners.max(axis=0) + gap))
         x0, y0 = np.maximum(np.floor(low).astype(int), 0)
         x1, y1 = np.minimum(np.ceil(high).astype(int), self.filled.shape)
@@ -48,7 +48,7 @@ class Obstacles:
 
 
 def _is_near(corners: Float, points: Float, gap: float) -> bool:
-    """Return whether one of the points (N, 2) lies on the inner side of each side of a convex polygon moved out by a gap."""
+    """Return whether one of the points (N, 2) is inside a convex polygon whose sides are moved out by a gap."""
     sides = np.roll(corners, -1, axis=0) - corners
     turn = sides[0, 0] * sides[1, 1] - sides[0, 1] * sides[1, 0]
     lengths = np.maximum(np.linalg.norm(sides, axis=1), 1e-12)
@@ -60,8 +60,8 @@ def _is_near(corners: Float, points: Float, gap: float) -> bool:
 def obstacles(
     vertices: Float, triangles: NDArray[np.int32], height: float, reach: float = REACH, step: float = STEP
 ) -> Obstacles | None:
-    """The cells over which triangles (M, 3) of vertices (N, 3), in the floor's axes, stand between the floor and a height, as
-    far as a layout reaches from the middle; None where nothing does. `step`: metres up to which a mesh is floor.
+    """The cells filled between the floor and a height by triangles (M, 3) of vertices (N, 3), in the floor's axes, up to the
+    layout's `reach` from the middle; None if no cell is. `step`: metres up to which a mesh counts as floor.
     """
     from PIL import Image, ImageDraw
 
@@ -85,5 +85,5 @@ def obstacles(
 
 
 def _cell(side: float) -> float:
-    """Metres of a cell of a grid with a longer side of this length."""
+    """Side of a cell, metres, for a grid with a longer side of this length."""
     return max(side / CELLS if side <= CELLS * FINE else max(FINE, side / MOST_CELLS), 1e-4)

@@ -22,7 +22,7 @@ Spot = tuple[float, float, float]
 
 
 Memory = Callable[[Callable[[], Any]], Any]
-"""Gives the plain data that the function makes, or what it made when it was first asked for the same, on any machine."""
+"""Returns the plain data that the function makes, or the result stored at its first call on any machine."""
 
 
 def forgetful(make: Callable[[], Any]) -> Any:
@@ -44,10 +44,10 @@ class Room:
     `seen_from`: azimuth and elevation of the camera, degrees, None if unknown.
     `memory`: keeps simulated results.
     `moves`: whether the paths of things to their places are needed, too.
-    `built` gives the parts of the place's mesh up to a height above the floor, within a layout's reach, metres.
+    `built` returns the parts of the place's mesh up to a height above the floor, within a layout's reach, metres.
     `blocked` holds these parts for the placed things.
-    `lanes`, `bays` and `pavements`: those of the place.
-    `furniture` gives the objects on and beside them, for a place of the zoo.
+    `lanes`, `bays` and `pavements` are the place's.
+    `furniture` returns the objects on and next to them, for a place of the zoo.
     """
 
     free: Footprint | None = None
@@ -77,7 +77,7 @@ class Room:
         return replace(self, blocked=self.built(highest, reach))
 
     def is_clear(self, own: Footprint | Outline, others: Crowd) -> bool:
-        """Return whether something that covers so much of the floor is clear of others and of the place, by the gap."""
+        """Return whether a cover of the floor is clear of others and of the place by the gap."""
         if not others.is_clear(own, self.gap):
             return False
         return self.blocked is None or not self.blocked.meets(own.corners, self.gap)
@@ -89,10 +89,10 @@ class Room:
 
 
 def checked(cast: Sequence[ModelSpec], room: Room, shapes: Sequence[Shape], poses: Sequence[Matrix4]) -> Sequence[Matrix4]:
-    """The same poses, of things that stand upright on the floor.
+    """The same poses, checked, for things that stand upright on the floor.
 
-    Raises RecipeError where two are nearer than the room's gap, by their boxes, or nearer to what stands there before, or where
-    one is beyond the free floor.
+    Raises RecipeError if two things, by their boxes, are nearer than the room's gap, or nearer to a thing already in place, or
+    if one is beyond the free floor.
     """
     names = ["the model that it joins"] * len(room.taken) + [spec.key for spec in cast]
     prints = [*room.prints, *(footprint(shape.box, pose) for shape, pose in zip(shapes, poses, strict=True))]

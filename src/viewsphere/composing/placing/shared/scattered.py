@@ -1,4 +1,4 @@
-"""Things one after another, each at a spot that is found for it, as several placers scatter them."""
+"""Scattering for several placers: things are placed one after another, each at a free spot."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.scene import IDENTITY, Matrix4
 
 Spot = Callable[[np.random.Generator, Room, NDArray[np.float64], Others, Cover], Matrix4 | None]
-"""Finds a pose for a box in a room, clear of what others cover."""
+"""Finds a pose for a box in a room, clear of the other things."""
 
 
 class Gaps(Frozen):
@@ -42,8 +42,9 @@ def scattered(
     spot: Spot,
     floor: Footprint | None = None,
 ) -> Sequence[Matrix4]:
-    """Poses, no two boxes, or hulls, nearer than the room's gap, and none nearer to the place's mesh; raises RecipeError where
-    no spot is found for one. Each member's draws are for its slot and its key. `floor`: where spots are; by default the room's.
+    """Poses with no two boxes, or hulls, nearer than the room's gap, and none nearer to the place's mesh; raises RecipeError if
+    no spot is found for a model. Slot and key seed the draws of each member. `floor`: the floor of the spots, by default the
+    room's.
     """
     reach = _reach(floor, room, shapes)
     room = room.obstacles(shapes, reach)
@@ -82,8 +83,8 @@ def _check_size(spec: ModelSpec, shape: Shape, floor: Footprint | None, field: s
 
 
 def _reach(floor: Footprint | None, room: Room, shapes: Sequence[Shape]) -> float:
-    """Metres from the middle to the farthest spot: the end of the floor, or, where that is nearer, twice the side of a square
-    that holds the models however they are turned.
+    """Metres from the middle to the farthest spot: the end of the floor or, if nearer, twice the side of a square that holds
+    the models at any turn.
     """
     widths = [float(np.linalg.norm(Box3d(shape.box).diagonal[:2])) + room.gap for shape in shapes]
     heap = 2 * float(np.linalg.norm(widths))
@@ -93,5 +94,5 @@ def _reach(floor: Footprint | None, room: Room, shapes: Sequence[Shape]) -> floa
 
 
 def _seen_from_above(shape: Shape) -> NDArray[np.float64]:
-    """Points (N, 3) of a model that cover as much of the floor as all of it, however it is turned about the vertical."""
+    """Points (N, 3) of a model that cover the same floor as the whole model, at any turn about the vertical."""
     return np.insert(convex_hull(shape.vertices()[:, :2]), 2, 0.0, axis=1)

@@ -1,4 +1,4 @@
-"""The shape of a model, as far as placing asks."""
+"""The shape of a model, for placers."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ Surface = tuple[Float, NDArray[np.int32]]
 
 @dataclass(frozen=True, eq=False)
 class Shape:
-    """A model's shape in its own axes, metres: its box (8, 3), and its convex hull, for which `vertices` is asked when it is
-    first needed: it gives those of the model's mesh, (N, 3). `surface` gives them with the mesh's triangles (M, 3).
+    """A model's shape in its own axes, metres: its box (8, 3), and its convex hull, computed on first access. `vertices`
+    returns the vertices (N, 3) of the model's mesh; `surface` returns them with the mesh's triangles (M, 3).
     """
 
     box: Float
@@ -41,7 +41,7 @@ class Shape:
 
     @property
     def length(self) -> float:
-        """Of its box's longest side, metres."""
+        """Length of its box's longest side, metres."""
         return float((self.box.max(axis=0) - self.box.min(axis=0)).max())
 
     @cached_property

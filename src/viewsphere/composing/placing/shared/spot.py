@@ -17,13 +17,12 @@ from viewsphere.geometry.box3d import Box3d
 from viewsphere.model.scene import IDENTITY, Matrix4
 
 TRIES = 2000
-"""Spots that are tried for one model; the circle they lie in grows with each."""
+"""Number of tried spots for one model; their circle grows with each try."""
 
 GROWTH = 0.01  # of the radius a try: TRIES tries reach the whole floor. Chosen by that, not measured
 
 SPREAD_TRIES = 400
-"""Spots of a bounded floor that are tried for one model: where fewer than one in a hundred is free, another draw finds room
-sooner."""
+"""Number of tried spots for one model on a bounded floor: if fewer than one in a hundred is free, another draw is faster."""
 
 Float = NDArray[np.float64]
 Cover = Callable[[Matrix4], Any]
@@ -46,7 +45,9 @@ class Others:
             taken.add(cover)
 
     def untaken(self, cover: Cover, spots: Float, turns: Float) -> NDArray[np.intp]:
-        """Numbers of the spots (N, 2) that may be clear for a thing turned so, radians; most crowded ones are left out."""
+        """Numbers of the spots (N, 2) that may be clear for a thing with these turns, radians; most crowded spots are left
+        out.
+        """
         x, y, _, inner, _ = cover(IDENTITY).circle
         fitting = [taken for taken in self.maps if taken.slim <= inner]
         if not fitting:
@@ -56,8 +57,8 @@ class Others:
 
 
 def free_spot(rng: np.random.Generator, room: Room, box: Float, others: Others, cover: Cover) -> Matrix4 | None:
-    """A pose on the free floor, turned at random, where what it covers is clear of what others cover: uniform in a circle that
-    grows until there is room; None where none is found.
+    """A pose on the free floor, turned at random, with its cover clear of others: uniform in a circle that grows until there is
+    room; None if none is found.
     """
     draws = rng.random((TRIES, 3))
     radii = _radii(room, box, others)
@@ -74,7 +75,9 @@ def free_spot(rng: np.random.Generator, room: Room, box: Float, others: Others, 
 
 
 def _radii(room: Room, box: Float, others: Others) -> Float:
-    """Radii of the circle that grows, one for each try: boxes are no nearer than the first; a hull is somewhere in its box."""
+    """Radii of the growing circle, one for each try. Boxes cannot be nearer than the first radius; hulls can, inside their
+    boxes.
+    """
     if not others.crowd.covers:
         return np.zeros(TRIES)
     narrowest, first = float(Box3d(box).diagonal[:2].min() / 2), others.crowd.covers[0]
@@ -88,8 +91,8 @@ def _radii(room: Room, box: Float, others: Others) -> Float:
 def spread_spot(
     rng: np.random.Generator, room: Room, floor: Footprint, box: Float, others: Others, cover: Cover
 ) -> Matrix4 | None:
-    """A pose on a bounded floor, turned at random and uniform over all that are clear of what others cover and of the place;
-    None where none is found.
+    """A pose on a bounded floor, turned at random and uniform over all poses that are clear of other things and of the place;
+    None if none is found.
     """
     draws = rng.random((SPREAD_TRIES, 3))
     spots = floor.center + (2 * draws[:, :2] - 1) * floor.half @ floor.axes

@@ -20,7 +20,7 @@ DIGITS = 12
 """Decimal places of recorded poses: the last digits of sines and powers differ between processors."""
 
 SAME = 1e-6
-"""Metres from its own place at which a rig cannot look."""
+"""Least distance of a rig's target from the rig, metres."""
 
 STEEP = 1e-9
 """Tangent of the angle to the vertical below which a rig looks straight up or down."""
@@ -39,7 +39,7 @@ def focuses(entry: Moving, look: object, times: Float, world: World) -> list[Flo
 
 
 def aimed(centers: Float, ahead: Float, focus: Sequence[Float] | None, world: World) -> tuple[RigPose, ...]:
-    """The rig at places (T, 3), level; it looks at a focus each, or along directions (T, 3)."""
+    """The level rig at positions (T, 3); it looks at one focus for each, or along directions (T, 3)."""
     found: list[RigPose] = []
     for instant, center in enumerate(centers):
         toward = ahead[instant] if focus is None else focus[instant] - center
@@ -56,7 +56,9 @@ def aimed(centers: Float, ahead: Float, focus: Sequence[Float] | None, world: Wo
 
 
 def facing(forward: Float) -> Float:
-    """Axes (3, 3), in columns, of a level camera that looks along a unit vector; straight up or down as at azimuth 0."""
+    """Axes (3, 3), in columns, of a level camera that looks along a unit vector; straight up or down, it is oriented as at
+    azimuth 0.
+    """
     x, y, z = forward.tolist()
     level = math.sqrt(x * x + y * y)
     if level < STEEP:
@@ -67,24 +69,26 @@ def facing(forward: Float) -> Float:
 
 
 def overhead(heading: float) -> Float:
-    """Axes, in columns, of a camera that looks straight down; `heading` (degrees from +Y, counter-clockwise) is up there."""
+    """Axes, in columns, of a camera that looks straight down; `heading` (degrees from +Y, counter-clockwise) is up in its
+    picture.
+    """
     return np.round(orbit_rotation(math.radians(heading), math.pi / 2).T, DIGITS)
 
 
 def around(focus: Float, azimuth: float, elevation: float, distance: float, tilt: float) -> RigPose:
-    """The rig on a sphere around what it looks at; degrees and metres."""
+    """The rig on a sphere around its target; degrees and metres."""
     a, e, t = (math.radians(v) for v in (azimuth, elevation, tilt))
     return posed(orbit_rotation(a, e, t).T, focus + orbit_center(a, e, distance), focus)
 
 
 def posed(axes: Float, center: Float, focus: Float) -> RigPose:
-    """The pose with these axes (3, 3), in columns, to as many digits as are the same on all processors."""
+    """The pose with these axes (3, 3), in columns, rounded to digits that are equal on all processors."""
     x, y, z = (float(v) + 0.0 for v in np.round(focus, DIGITS))
     return RigPose(np.round(rigid(axes, center), DIGITS) + 0.0, (x, y, z))
 
 
 def on_axis(center: Float, forward: Float, world: World) -> Float:
-    """The point ahead that is nearest to the models; 1 m ahead where these lie behind."""
+    """The point ahead that is nearest to the models; 1 m ahead if the models are behind."""
     distance = float((forward * (np.array(world.target) - center)).sum())
     return center + max(distance, 1.0) * forward
 

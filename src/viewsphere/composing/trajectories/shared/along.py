@@ -1,4 +1,4 @@
-"""A rig that goes along a curve."""
+"""A rig that moves along a curve."""
 
 from __future__ import annotations
 

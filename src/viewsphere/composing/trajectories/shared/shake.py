@@ -1,4 +1,4 @@
-"""The hand that is not still."""
+"""The shake of a hand-held camera."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ Float = NDArray[np.float64]
 
 
 def shaken(poses: Sequence[RigPose], shake: Shake, times: Float, world: World) -> tuple[RigPose, ...]:
-    """The poses, turned about and moved along their own axes by smooth noise that follows from the sequence's names."""
+    """The poses, turned about and moved along their own axes by smooth noise seeded by the sequence's names."""
     return tuple(_shaken(poses, shake, times, world))
 
 
@@ -34,21 +34,21 @@ def _shaken(poses: Sequence[RigPose], shake: Shake, times: Float, world: World) 
 
 @dataclass(frozen=True, eq=False)
 class Handheld:
-    """A trajectory that is shaken."""
+    """A trajectory with shake."""
 
     steady: Trajectory
     shake: Shake
 
     @property
     def digest(self) -> str:
-        """That of the trajectory."""
+        """The value of the unshaken trajectory."""
         return self.steady.digest
 
     @property
     def intrinsics(self) -> Intrinsics | None:
-        """That of the trajectory."""
+        """The value of the unshaken trajectory."""
         return self.steady.intrinsics
 
     def poses(self, times: Float, world: World) -> tuple[RigPose, ...]:
-        """As `Trajectory.poses`."""
+        """See `Trajectory.poses`."""
         return shaken(self.steady.poses(times, world), self.shake, times, world)

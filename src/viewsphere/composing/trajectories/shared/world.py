@@ -49,17 +49,17 @@ class Trajectory(Protocol):
     """A motion of the rig. Equal times and worlds give equal poses, to the last bit."""
 
     def poses(self, times: Float, world: World) -> tuple[RigPose, ...]:
-        """The rig at all instants of a sequence, whose times (T,) in seconds ascend from 0. Raises RecipeError where the world
-        lacks what the trajectory needs, or the rig would look at its own place.
+        """The rig at all instants of a sequence, whose times (T,) in seconds ascend from 0. Raises RecipeError if the world
+        lacks the trajectory's inputs, or if the rig would look at its own position.
         """
         ...
 
     @property
     def digest(self) -> str:
-        """SHA-256 of what the recipe does not say, as it stands in a file; empty if there is no such thing."""
+        """SHA-256 of the trajectory's file; empty without one."""
         ...
 
     @property
     def intrinsics(self) -> Intrinsics | None:
-        """The lens at first, where a file names one."""
+        """The lens of the first pose, if a file names one."""
         ...

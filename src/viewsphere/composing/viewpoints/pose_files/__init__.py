@@ -11,7 +11,7 @@ from viewsphere.validation.errors import one_of
 
 FORMATS = ("csv", "view", "tum", "kitti", "nerfstudio", "colmap", "shots")
 COLUMNS = {4: "view", 8: "tum", 12: "kitti"}
-"""Numbers in a line of the formats that have nothing else."""
+"""Count of numbers in a line, for formats whose lines are only numbers."""
 
 ENDINGS = {".json": "nerfstudio", ".csv": "csv", ".jsonl": "shots"}
 
@@ -21,8 +21,8 @@ __all__ = ["FORMATS", "Arranged", "Extrinsics", "Orbit", "PoseFile", "read_poses
 def read_poses(path: Path, kind: str = "auto", every: int = 1) -> PoseFile:
     """Every `every`-th pose of a file (of COLMAP: a folder), and the file's lens if it has one.
 
-    `kind` is one of FORMATS, or `auto`: by the path's ending, and for text by the numbers in its first line. Raises
-    RecipeError, with file and line, for anything that cannot be read, and for a file without poses.
+    `kind` is one of FORMATS, or `auto`: by the path's ending, and for text by the count of numbers in its first line. Raises
+    RecipeError, with file and line, for an unreadable file or a file without poses.
     """
     kind = _kind(path) if kind == "auto" else kind
     found = _read(path, kind)

@@ -1,4 +1,4 @@
-"""Cameras of 3D files (.blend, FBX, glTF, USD), at frames of their animation: as Blender places them."""
+"""Cameras of 3D files (.blend, FBX, glTF, USD), at frames of their animation, as Blender evaluates them."""
 
 from __future__ import annotations
 
@@ -22,10 +22,10 @@ SUFFIXES = (".abc", ".blend", ".fbx", ".glb", ".gltf", ".usd", ".usda", ".usdc",
 
 
 def read_cameras(path: Path, entry: PoseList, zooms: bool = False) -> PoseFile:
-    """The poses of the entry's camera at its frames, in metres, +z up, and its lens; with `zooms` a lens for each where they
+    """The poses of the entry's camera at its frames, in metres, +z up, and its lens; with `zooms`, a lens for each pose if they
     differ.
 
-    Raises RecipeError for a file without such a camera or such frames, and without `zooms` for a lens that changes.
+    Raises RecipeError for a missing camera or missing frames and, without `zooms`, for a lens that changes.
     """
     from viewsphere.assets.animation.timeline import Blenders  # which loads readers of models
 
@@ -57,7 +57,7 @@ def _frames(path: Path, entry: PoseList, blenders: Blenders) -> tuple[int, ...] 
 
 
 def _lens(told: dict[str, Any]) -> Intrinsics:
-    """Blender computes in single precision: seven digits are what is known."""
+    """The lens of a camera, rounded to seven digits, because Blender computes in single precision."""
     fx, fy, cx, cy = (float(f"{told[name]:.7g}") for name in ("fx", "fy", "cx", "cy"))
     return Intrinsics(width=told["width"], height=told["height"], fx=fx, fy=fy, cx=cx, cy=cy)
 

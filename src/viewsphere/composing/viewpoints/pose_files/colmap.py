@@ -36,7 +36,7 @@ MOST_IN_ONE_LINE = 10
 def read_colmap(path: Path) -> PoseFile:
     """Images in the order of their names, with the lens they share; the pixel origin is the image's corner, as here.
 
-    `path` is the folder, or its images.txt. COLMAP's world has no up of its own; most often y points down.
+    `path` is the folder, or its images.txt. COLMAP's world has no defined up axis; usually y points down.
     """
     folder = path if path.is_dir() else path.parent
     cameras = {int(words[0]): _camera(words, where) for words, where in _camera_lines(folder / "cameras.txt")}

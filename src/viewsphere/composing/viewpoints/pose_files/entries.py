@@ -64,7 +64,7 @@ class PoseFile:
     shots: tuple[Arranged, ...] = field(default=(), repr=False)
 
     def thinned(self, every: int) -> PoseFile:
-        """Every so many-th pose."""
+        """The file with only every `every`-th pose."""
         times = self.times and self.times[::every]
         thinned = {"lenses": self.lenses[::every], "shots": self.shots[::every]}
         return replace(self, entries=self.entries[::every], times=times, **thinned)

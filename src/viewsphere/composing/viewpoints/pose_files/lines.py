@@ -11,11 +11,11 @@ from viewsphere import files
 from viewsphere.errors import RecipeError
 
 _ALMOST = re.compile(r"[-+.,0-9eE]{0,24}|[A-Za-z]{1,3}")
-"""Words that messages quote: those that are meant as numbers. Others may be of a private file that lists none."""
+"""Pattern of words that messages quote: those meant as numbers. Other words may come from a private file without poses."""
 
 
 def read_text(path: Path, of: str = "poses", limit: str = "MAX_POSES_BYTES") -> str:
-    """The text of a file in UTF-8; raises RecipeError if there is none, or one beyond the named limit."""
+    """The text of a file in UTF-8; raises RecipeError if it is missing, not text, or beyond the named limit."""
     try:
         return files.read_text(path, limit, "utf-8-sig")
     except OSError as error:

@@ -1,4 +1,4 @@
-"""Rotations and motions of other conventions as ours."""
+"""Conversion of rotations and motions from other conventions."""
 
 from __future__ import annotations
 
@@ -28,7 +28,9 @@ def from_quaternion(wxyz: Sequence[float], where: str) -> Float:
 
 
 def motion(world_from_camera: Float, center: Float, where: str) -> Extrinsics:
-    """A camera by its rotation to the world (3, 3), OpenCV axes, and its centre; RecipeError if that is no rotation."""
+    """A camera from its rotation to the world (3, 3), OpenCV axes, and its centre; raises RecipeError if the matrix is not a
+    rotation.
+    """
     rotation = nearest_rotation(world_from_camera)
     if rotation is None or np.abs(rotation - world_from_camera).max() > RIGHT_ANGLES:
         raise RecipeError(f"{where}: expected a rotation; found a matrix that is none")
@@ -36,13 +38,13 @@ def motion(world_from_camera: Float, center: Float, where: str) -> Extrinsics:
 
 
 def from_matrix(values: Sequence[float], where: str) -> Extrinsics:
-    """A camera by the 12 (or 16) numbers of its camera-to-world matrix, row by row, OpenCV axes."""
+    """A camera from the 12 (or 16) numbers of its camera-to-world matrix, row by row, OpenCV axes."""
     matrix = np.array(values[:12], np.float64).reshape(3, 4)
     return motion(matrix[:, :3], matrix[:, 3], where)
 
 
 def nearest_rotation(matrix: Float) -> Float | None:
-    """The rotation nearest to a matrix that nearly is one; None for a mirror image and for anything flat.
+    """The rotation nearest to an approximate rotation matrix; None for a mirror image or a singular matrix.
 
     Newton's iteration for the polar factor (Higham 1986), written out, because LAPACK rounds differently from processor to
     processor.
@@ -58,8 +60,8 @@ def nearest_rotation(matrix: Float) -> Float | None:
 
 
 def motions(poses: Float, where: Callable[[int], str]) -> tuple[Extrinsics, ...]:
-    """The same as `motion` of many poses (N, 4, 4), of which `where` tells the place: all at once, which is a hundred times as
-    fast.
+    """The results of `motion` for many poses (N, 4, 4), all at once, which is a hundred times faster; `where` returns a pose's
+    place for messages.
     """
     given = poses[:, :3, :3]
     turns = given
@@ -67,7 +69,7 @@ def motions(poses: Float, where: Callable[[int], str]) -> tuple[Extrinsics, ...]
         a, b, c = np.moveaxis(turns, 1, 0)
         cofactors = np.stack([np.cross(b, c), np.cross(c, a), np.cross(a, b)], axis=1)
         determinants = (a * cofactors[:, 0]).sum(axis=1)
-        safe = np.where(determinants < 0.5, np.inf, determinants)  # a mirror image, or flat: halved again and again
+        safe = np.where(determinants < 0.5, np.inf, determinants)  # a mirror image, or singular: halved again and again
         turns = (turns + cofactors / safe[:, None, None]) / 2
     wrong = np.flatnonzero(~(np.abs(turns - given).max(axis=(1, 2), initial=0.0) <= RIGHT_ANGLES))
     if wrong.size:

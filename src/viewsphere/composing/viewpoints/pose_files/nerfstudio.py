@@ -27,7 +27,7 @@ MODELS = ("OPENCV", "OPENCV_FISHEYE", "PINHOLE", "SIMPLE_PINHOLE")
 def read_nerfstudio(path: Path) -> PoseFile:
     """Frames' `transform_matrix`: camera to world in OpenGL's axes (x right, y up, looking along -z), world Z up.
 
-    The lens (`fl_x`, `camera_model`, ... or `camera_angle_x`) may stand beside the frames or in each of them
+    The lens (`fl_x`, `camera_model`, ... or `camera_angle_x`) may be given once or in each frame
     (https://docs.nerf.studio/quickstart/data_conventions.html); without `w` and `h` there is none.
     """
     try:

@@ -13,11 +13,11 @@ from viewsphere.validation.errors import nearest
 
 NEEDED = ("azimuth", "elevation", "distance")
 TILTS = ("tilt", "theta", "in_plane")
-"""Names of the roll: ours, PASCAL3D+'s, and that of pose estimators; all turn the same way."""
+"""Names of the roll: viewsphere's, PASCAL3D+'s, and the one of pose estimators; all turn the same way."""
 
 
 def read_csv(path: Path) -> PoseFile:
-    """A table with the columns azimuth, elevation, distance and, if it likes, tilt (or theta); others are left alone.
+    """A table with the columns azimuth, elevation, distance and, optionally, tilt (or theta); other columns are ignored.
 
     Degrees and metres. PASCAL3D+'s `viewpoint` fields have these names and meanings
     (https://cvgl.stanford.edu/projects/pascal3d.html).

@@ -1,4 +1,4 @@
-"""Files of shots (`.jsonl`): a line each, JSON as `viewsphere.model.listed` has it."""
+"""Files of shots (`.jsonl`): a line each, JSON as defined in `viewsphere.model.listed`."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def read_shots(path: Path) -> PoseFile:
 
 @lru_cache(maxsize=1)
 def _read(path: Path, _stamp: tuple[int, int]) -> PoseFile:
-    """The same of a file as it was last changed: samplers ask more than once."""
+    """The shots of a file, cached by its modification time, because samplers read it more than once."""
     found: list[tuple[int, ListedShot]] = []
     first = dict[str, int]()
     for line, said in _lines(path):
@@ -79,7 +79,7 @@ def _motions(poses: Sequence[tuple[Pose, str]]) -> tuple[Extrinsics, ...]:
 
 
 def _lenses(path: Path, shots: list[Arranged]) -> tuple[Intrinsics, ...]:
-    """The lens of each shot; none where no line has one."""
+    """The lens of each shot; empty if no line has one."""
     lenses = [shot.said.camera for shot in shots if shot.said.camera is not None]
     if lenses and len(lenses) < len(shots):
         line = next(shot.line for shot in shots if shot.said.camera is None)

@@ -1,4 +1,4 @@
-"""A thing that moves through a sequence: where it is at an instant is found when that is asked for."""
+"""A thing that moves through a sequence: its pose at an instant is computed on request."""
 
 from __future__ import annotations
 
@@ -22,15 +22,15 @@ class Moving:
 
     @property
     def is_still(self) -> bool:
-        """Return whether the thing stands at one place all the time, and shows no time step."""
+        """Return whether the thing always has one pose, and shows no time step."""
         return not self._goes and not self._plays and self._first_step is None
 
     def motion_at(self, instant: int) -> Motion:
-        """The motion of what stays as the thing is at an instant."""
+        """A still motion with the thing's pose and time step at an instant."""
         return Motion(poses=(self._pose(instant),), steps=(self._step(instant),))
 
     def during(self, instants: Sequence[int]) -> Motion:
-        """The motion at some instants. What moves in the sequence is not still where it rests for a while."""
+        """The motion at some instants. A thing that moves in the sequence does not count as still while it rests."""
         poses = tuple(map(self._pose, instants if self._goes else (0,)))
         steps = tuple(map(self._step, instants if self._plays else (0,)))
         return Motion(poses=poses, steps=steps, moves=not self.is_still)
@@ -46,7 +46,7 @@ class Moving:
 
     @cached_property
     def _goes(self) -> bool:
-        """Return whether it is not at one place all the time."""
+        """Return whether its pose changes."""
         return _differ(map(self._pose, _here_and_there(self.time.count)))
 
     @cached_property
@@ -56,7 +56,7 @@ class Moving:
 
     @cached_property
     def _first_step(self) -> TimeStep | None:
-        """The first time step that it shows, None where it plays no file or is never there."""
+        """The first time step that it shows, None if it plays no animation or is always absent."""
         return next(filter(None, map(self._shown, range(self.time.count))), None) if self.plays_file else None
 
     def _pose(self, instant: int) -> Matrix4 | None:
@@ -80,8 +80,8 @@ def _differ(values: Iterator[object]) -> bool:
 
 
 def _here_and_there(count: int) -> Iterator[int]:
-    """The numbers below `count`, upwards, and in turns by halves, quarters, ...: so two that differ are soon found where they
-    differ at first, or for long.
+    """The numbers below `count`, alternately in ascending order and by halves, quarters, ...: this soon finds a difference that
+    is early, or that lasts long.
     """
     return chain.from_iterable(zip(range(count), _halved(count), strict=True))
 

@@ -1,6 +1,6 @@
-"""Random scenes of models, as several samplers make them: which models, of which split, and where they stand.
+"""Random scenes for several samplers: their models, the models' split, and their places.
 
-Scene k follows from the seed, its name and the models alone: it is the same however many scenes there are.
+Scene k depends only on the seed, its name and the models, not on the number of scenes.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ from viewsphere.validation.errors import one_of
 from viewsphere.validation.quantity import quantity
 
 LOOKS = 8
-"""Looks of one piece of scenery."""
+"""Number of different looks of one piece of scenery."""
 
 
 def scenes_entry(recipe: Recipe) -> ScenesEntry:
@@ -44,7 +44,7 @@ def scenes_entry(recipe: Recipe) -> ScenesEntry:
 
 
 def scene_names(recipe: Recipe) -> tuple[str, ...]:
-    """The scenes' names; raises RecipeError where they have company, or are more than the frames that are wanted at most."""
+    """The scenes' names; raises RecipeError if they have company, or are more than the limit of frames."""
     count = scenes_entry(recipe).count
     if recipe.scene.company is not None:
         raise RecipeError("scene.company: expected none beside scenes, which have several models each; found one: leave it out")
@@ -58,7 +58,7 @@ def scene_names(recipe: Recipe) -> tuple[str, ...]:
 
 
 def scene_cast(context: SamplingContext, subject: str) -> tuple[ModelSpec, ...]:
-    """The models of a scene, of one split where splits are by model."""
+    """The models of a scene; with splits by model, all of one split."""
     recipe, entry = context.recipe, scenes_entry(context.recipe)
     models = _models_for(context, _group(context, subject))
     names = (subject, *redraw_names(context.redraw, SAME_MODELS))
@@ -78,12 +78,12 @@ def _size(recipe: Recipe, subject: str, redraw: int = 0) -> int:
 
 
 def _group(context: SamplingContext, subject: str) -> str:
-    """The split that a scene's models are of, where splits are by model; else the empty name of all."""
+    """The split of a scene's models if splits are by model; else an empty name, which means all."""
     return scene_split(context, subject) if context.recipe.splits.by == "model" else ""
 
 
 def _models_for(context: SamplingContext, group: str) -> tuple[ModelSpec, ...]:
-    """The models that may meet in scenes of a group."""
+    """The models that may share a scene of a group."""
     return tuple(spec for spec in context.model_specs if not group or context.dealt_splits[spec.key] == group)
 
 
@@ -102,14 +102,14 @@ def _categories(context: SamplingContext) -> dict[str, tuple[tuple[str, int], ..
 
 
 def scene_split(context: SamplingContext, subject: str) -> str:
-    """The split of a scene where splits are by model: it draws its split first, then models of this split; shares follow from
-    the numbers of models where some of these are listed.
+    """The split of a scene if splits are by model: the scene draws its split first, then models of this split. If some models
+    are listed, shares follow from the numbers of models.
     """
     return drawn_split(_shares(context.root), context.recipe.lasting_seed, (subject,))
 
 
 def scene_laid(context: SamplingContext, subject: str, pose: str | None, box_of: BoxOf) -> Laid:
-    """The models of a scene as its layout places them; the last ones are kept, whatever the redraws of frames."""
+    """The models of a scene as its layout places them; the last results are cached, independent of redraws of frames."""
     return _laid(context.root, context.redraw, subject, pose, box_of)
 
 
@@ -150,13 +150,13 @@ def _laid(root: SamplingContext, redraw: int, subject: str, pose: str | None, bo
 
 
 def scene_things(context: SamplingContext, subject: str, pose: str | None, box_of: BoxOf) -> tuple[Thing, ...]:
-    """The models of a scene where they stand; raises RecipeError where there is no room."""
+    """The placed models of a scene; raises RecipeError if there is not enough room."""
     layout, cast = scene_laid(context, subject, pose, box_of), scene_cast(context, subject)
     return still(cast, layout.poses[: len(cast)])
 
 
 def scene_distractors(context: SamplingContext, subject: str, pose: str | None, box_of: BoxOf) -> tuple[Thing, ...]:
-    """The models of a scene that are not labelled, where they stand."""
+    """The placed models of a scene that are not labelled."""
     layout, count = scene_laid(context, subject, pose, box_of), len(scene_cast(context, subject))
     placed = zip(layout.members[count:], layout.poses[count:], strict=True)
     return tuple(Thing(id=0, model=spec, motion=Motion.still(at), scenery=True) for spec, at in placed)
@@ -184,7 +184,7 @@ def scene_around(context: SamplingContext, subject: str, pose: str | None, box_o
 
 
 def _spec(piece: Piece, seed: int, subject: str) -> ModelSpec:
-    """The model of a piece of scenery, one of a few looks that are drawn for the scene."""
+    """The model of a piece of scenery, in one of a few looks drawn for the scene."""
     name = piece.source.partition(":")[2]
     look = int(generator(seed, "piece", subject, name).integers(LOOKS))
     return ModelSpec(
@@ -199,7 +199,7 @@ def _spec(piece: Piece, seed: int, subject: str) -> ModelSpec:
 
 
 def check_surface(recipe: Recipe) -> None:
-    """Raise RecipeError where models are to stand on a surface that no draw of the place has."""
+    """Raise RecipeError if models are to stand on a surface that no draw of the place has."""
     on, place = scenes_entry(recipe).surface, recipe.scene.place
     if isinstance(on, str):
         names = () if place is None else draw_names(place.draw, "scene-000000", "")
@@ -235,7 +235,7 @@ def _named(name: str, found: Sequence[Surface]) -> Surface:
 
 
 def scene_views(context: SamplingContext, subject: str) -> Sequence[int]:
-    """Numbers of the viewpoints that a scene is taken from, ascending: where they are drawn, those of the lowest hashes."""
+    """Numbers of a scene's viewpoints, ascending: if they are drawn, those with the lowest hashes."""
     if not are_views_drawn(context):
         return range(len(context.views))
     hashed = shares(context.recipe.seed, "scene's views", subject, each=context.view_names)
@@ -243,13 +243,13 @@ def scene_views(context: SamplingContext, subject: str) -> Sequence[int]:
 
 
 def are_views_drawn(context: SamplingContext) -> bool:
-    """Return whether scenes are taken from some of the viewpoints each, rather than from all."""
+    """Return whether each scene uses only some of the viewpoints."""
     count = scenes_entry(context.recipe).views
     return count is not None and count < len(context.views)
 
 
 def check_scene_models(context: SamplingContext) -> None:
-    """Raise RecipeError where a scene may ask for more models than there are, of one split where splits are by model."""
+    """Raise RecipeError if a scene may need more models than exist, or, with splits by model, than one split has."""
     entry = scenes_entry(context.recipe)
     groups, names = {"": context.models}, [""]
     if context.recipe.splits.by == "model":
@@ -260,7 +260,7 @@ def check_scene_models(context: SamplingContext) -> None:
 
 
 def _too_few(entry: ScenesEntry, there: int, models: int, split: str) -> str:
-    """The problem of scenes that need more models than there are, and what mends it."""
+    """The error about scenes that need more models than exist, with its fix."""
     wanted = "at least one model" if entry.repeat else f"up to {quantity(entry.most_objects, 'model')}"
     if not split:
         return (
@@ -277,7 +277,7 @@ def _too_few(entry: ScenesEntry, there: int, models: int, split: str) -> str:
 
 @lru_cache(maxsize=2)
 def _shares(context: SamplingContext) -> dict[str, float]:
-    """The share of the scenes that each split has, where splits are by model."""
+    """The share of the scenes in each split, if splits are by model."""
     splits = context.recipe.splits
     if not any(isinstance(part, tuple) for part in splits.shares.values()):
         return shared(splits)

@@ -54,18 +54,18 @@ class SamplingContext(Sendable):
     pictures: Pictures  # of the scene
     subjects: tuple[str, ...]
     composition: Composition | None = None  # of place, company and planes
-    timings: tuple[Timing | None, ...] = ()  # of each model; none at all where nothing moves
-    kept_splits: Mapping[str, str] = field(default_factory=dict[str, str])  # of models and scenes that a data set has already
+    timings: tuple[Timing | None, ...] = ()  # of each model; empty if nothing moves
+    kept_splits: Mapping[str, str] = field(default_factory=dict[str, str])  # of models and scenes that exist in the data set
     own_rig: Rig | None = None  # the recipe's; None: one camera
     entries: tuple[int, ...] = ()  # of each model, the number of its entry in the recipe
-    tracks: Tracks | None = None  # what every sequence's sensors follow
+    tracks: Tracks | None = None  # the points that every sequence's sensors follow
     timelines: tuple[Timeline | None, ...] = ()  # of each model, the animation of its file that it plays in sequences
     redraws: Mapping[int, int] = field(default_factory=dict[int, int])  # of poses, how often each is redrawn
     original: SamplingContext | None = None  # the same without these redraws
-    redraw: int = 0  # how often what its scenes leave to chance is drawn again
+    redraw: int = 0  # how often its scenes' random values are drawn again
     distractors: tuple[tuple[ModelSpec, int], ...] = ()  # models that are not labelled, and the numbers of their entries
-    memory: Remembering = unremembered  # of what is simulated
-    variation: str = ""  # of the recipe's, that this is the light and the finish of
+    memory: Remembering = unremembered  # of simulation results
+    variation: str = ""  # the recipe's variation that light and finish belong to
     sequence_numbers: tuple[int, ...] = ()  # of each viewpoint of sequences, a data set's number; none where it has the same
 
     def with_redraws(self, redraws: Mapping[int, int]) -> Self:
@@ -73,7 +73,7 @@ class SamplingContext(Sendable):
         return self._sharing(redraws=redraws)
 
     def redrawn(self, number: int) -> Self:
-        """The same context with this redraw of its scenes; it shares what was computed, none of which depends on redraws."""
+        """The context with this redraw of its scenes; the two share computed values, none of which depends on redraws."""
         return self if number == self.redraw else self._sharing(redraw=number)
 
     def _sharing(self, **changes: Any) -> Self:
@@ -84,7 +84,7 @@ class SamplingContext(Sendable):
 
     @property
     def root(self) -> SamplingContext:
-        """The same without any redraw."""
+        """The context without any redraws."""
         return self.original or self
 
     @property
@@ -129,7 +129,7 @@ class SamplingContext(Sendable):
         return self.schedules[self.position[spec.key]]
 
     def steps_of(self, spec: ModelSpec) -> tuple[TimeStep, ...]:
-        """The time steps of a model's file that the data set keeps, ascending; none where it does not move."""
+        """The time steps of a model's file that the data set keeps, ascending; empty if it does not move."""
         place = self.position.get(spec.key)
         line = self.timelines[place] if self.timelines and place is not None else None
         if place is not None and line is not None:
@@ -140,7 +140,7 @@ class SamplingContext(Sendable):
         return tuple(chain((step for step in steps if step is not None), blend))
 
     def with_company(self, key: str, pose: int | None) -> tuple[ModelSpec, ...]:
-        """The model of this key and its company; without a pose only the model, where company is drawn for each frame."""
+        """The model of this key and its company; without a pose, only the model if company is drawn for each frame."""
         spec = self.spec(key)
         if self.composition is None or (pose is None and self.recipe.scene.is_moved_each_frame):
             return (spec,)
@@ -162,7 +162,7 @@ class SamplingContext(Sendable):
 
     @cached_property
     def dealt_splits(self) -> dict[str, str]:
-        """The split of every model, scene or sequence, where splits are by these; else none."""
+        """The split of every model, scene or sequence, if splits are by one of these; else empty."""
         by = self.recipe.splits.by
         names: Mapping[str, Sequence[str]] = {"model": tuple(self.position), "scene": self.subjects}
         if by == "sequence":
@@ -183,7 +183,9 @@ class SamplingContext(Sendable):
         return views.drawn_for(*redraw_names(self.redraw)) if self.redraw else views
 
     def sequence(self, subject: str, pose: int) -> str:
-        """The name of the sequence that a pose belongs to: the subject's, and where it has several the viewpoint's number."""
+        """The name of the sequence that a pose belongs to: the subject's name and, if it has several sequences, the viewpoint's
+        number.
+        """
         assert isinstance(self.pose_list, SequencePoses)
         view = pose // self.pose_list.instants
         number = self.sequence_numbers[view] if self.sequence_numbers else view
@@ -211,11 +213,11 @@ class SamplingContext(Sendable):
         return scene.model_copy(update={"blend": blend, "sun": None if blend.is_lit else scene.sun})
 
     def scene_pose(self, pose: int) -> str | None:
-        """Name of the pose, where what stands around is drawn for each frame, or each sequence."""
+        """Name of the pose if the surroundings are drawn for each frame, or each sequence."""
         return self.scene_name(pose) if self.recipe.scene.is_moved_each_frame else None
 
     def scene_name(self, pose: int) -> str:
-        """Name of what frames of a pose share no scene beyond: the frame, or the sequence."""
+        """Name of the frame or sequence that a scene belongs to; no scene is shared beyond it."""
         return self.pose_list.name(pose) if self.recipe.time is None else self.pose_list.place(pose)
 
     def repainted(self, things: Sequence[Thing], subject: str, pose: int) -> tuple[Thing, ...]:
@@ -229,12 +231,12 @@ class SamplingContext(Sendable):
         return thing.model_copy(update={"repaints": repaints}) if repaints else thing
 
     def view(self, views: Poses, pose: int) -> Viewpoint:
-        """The viewpoint of a pose, random ones as drawn at its redraw."""
+        """The viewpoint of a pose; random ones are drawn for the pose's redraw."""
         again = self.redraws.get(pose)
         return (views.drawn_for(f"try {again}") if again else views)[pose]
 
     def layout_names(self, pose: int) -> Names:
-        """Further names that the placing of company is drawn by: the redraws of a pose and of its scene."""
+        """Further names that seed the placing of company: the redraws of a pose and of its scene."""
         again = self.redraws.get(pose)
         is_redrawn = again and self.recipe.scene.company is not None and self.recipe.scene.company.draw == "per_frame"
         return ((f"try {again}",) if is_redrawn else ()) + redraw_names(self.redraw)
@@ -255,14 +257,14 @@ class SamplingContext(Sendable):
         return f"{name(pose)} try {again}" if again else name(pose)
 
     def instant(self, subject: str, view: Viewpoint, target: Vector | None, focus: Vector, split: str, number: int) -> Instant:
-        """The instant of a subject and a viewpoint; the camera looks at `target` unless the viewpoint has its own, and where
-        there is neither at `focus`. `number` is the instant's own.
+        """The instant of a subject and a viewpoint; the camera looks at the viewpoint's own target, else at `target`, else at
+        `focus`. `number` is the number of the instant.
         """
         seen = {"finish": self.finish(subject, view.index), "intrinsics": self.drawn_lens(subject, view.index)}
         return looking(self.viewpoint(subject, view, target), focus, index=number, split=split, **seen)
 
     def drawn_lens(self, subject: str, pose: int) -> Intrinsics | None:
-        """The lens of a subject's frame, or sequence, from a pose: drawn, or the pose's own; None where all have one."""
+        """The lens of a subject's frame, or sequence, from a pose: drawn, or the pose's own; None if all share one lens."""
         if self.recipe.camera.of_viewpoints:
             return self.pose_list.lens(pose)
         if not self.recipe.camera.is_random:
@@ -276,7 +278,7 @@ class SamplingContext(Sendable):
         return self.scenes.finish(subject, self.pose_list.name(pose), self.pose_list.place(pose))
 
     def finished(self, key: str, first: int, things: Sequence[Thing], scene: Scene, instants: Sequence[Instant]) -> Shot:
-        """A shot with all that the recipe says alike for every shot."""
+        """A shot with the recipe's settings that are equal for all shots."""
         return Shot(
             key=key,
             redraw=self.redraw,
@@ -297,7 +299,7 @@ class SamplingContext(Sendable):
 
 
 def _options(recipe: Recipe) -> dict[str, dict[str, JsonValue]]:
-    """The options of the labels that a recipe names; those that leave something to chance have the recipe's seed."""
+    """The options of the labels that a recipe names; options with random choices get the recipe's seed."""
     named = ((name, label_named(name)) for name in (*recipe.channels, *recipe.annotations))
     kinds = {name: label.options for name, label in named if label}
     drawn = {name: {"seed": recipe.seed} for name, kind in kinds.items() if kind and "seed" in kind.model_fields}
@@ -305,14 +307,14 @@ def _options(recipe: Recipe) -> dict[str, dict[str, JsonValue]]:
 
 
 def _lens(recipe: Recipe, *names: str) -> Intrinsics:
-    """The lens of the recipe's camera, drawn for these names; without any, one that stands for all."""
+    """The lens of the recipe's camera, drawn for these names; without names, one example of all."""
     return drawn(recipe.camera, lambda path: generator(recipe.seed, "camera", ".".join(path), *names)).intrinsics
 
 
 def lens(recipe: Recipe, views: Poses | None) -> Intrinsics:
-    """The lens that a recipe means with these poses (None: no file of them was read), one of them where it draws several.
+    """The lens of a recipe with these poses (None: no pose file was read); if it draws several lenses, one of them.
 
-    Raises RecipeError where their file names none.
+    Raises RecipeError if the pose file has no lens.
     """
     if not recipe.camera.of_viewpoints:
         return _lens(recipe)

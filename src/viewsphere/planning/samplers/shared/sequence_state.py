@@ -1,4 +1,4 @@
-"""The course of a whole sequence: the poses of its things and its rig at all instants, however shots divide it."""
+"""The state of a whole sequence: the poses of its things and its rig at all instants, however shots divide it."""
 
 from __future__ import annotations
 
@@ -34,8 +34,8 @@ Way = Callable[[float], Matrix4]
 
 @dataclass(frozen=True, eq=False)
 class SequenceState:
-    """One sequence: its things as they are placed, and what moves each, None where it stands still; what cameras look at that
-    have no target of their own; and where the rig is at all instants, None where it stands still at its viewpoint.
+    """One sequence: its placed things; the movement of each, None for still ones; the default target of cameras; and the rig's
+    poses at all instants, None for a still rig.
     """
 
     things: tuple[Thing, ...]
@@ -59,7 +59,7 @@ def _with(thing: Thing, motion: Motion | None) -> Thing:
 
 
 def _at(thing: Thing, moving: Moving | None, instant: int) -> Thing:
-    """The thing as it is at an instant: standing still there, or not there."""
+    """The thing as it is at an instant: as a still thing, or absent."""
     return _with(thing, moving and moving.motion_at(instant))
 
 
@@ -71,9 +71,10 @@ def time_of(context: SamplingContext) -> TimeEntry:
 
 @lru_cache(maxsize=2)
 def sequence_state(context: SamplingContext, subject: str, start: int, box_of: BoxOf) -> SequenceState:
-    """The sequence of a subject whose first pose has this number. The last ones are kept: shots of one follow one another.
+    """The sequence of a subject whose first pose has this number. The last results are cached, because shots of one sequence
+    follow one another.
 
-    Raises RecipeError where there is no room, and for what cannot move as it should.
+    Raises RecipeError if there is not enough room, and for impossible motions.
     """
     around = context.scene_pose(start)
     targets = placed_targets(context, subject, around, box_of)
@@ -104,7 +105,7 @@ def sequence_state(context: SamplingContext, subject: str, start: int, box_of: B
 
 
 def placed_targets(context: SamplingContext, subject: str, pose: str | None, box_of: BoxOf) -> tuple[Thing, ...]:
-    """The targets of a sequence where they are placed, on the floor; `pose` names what is drawn for each sequence."""
+    """The targets of a sequence at their places on the floor; `pose` names the draws of each sequence."""
     if context.recipe.scenes is not None:
         return scene_things(context, subject, pose, box_of)
     spec = context.spec(subject)
@@ -216,7 +217,7 @@ def _rig(
 
 
 def _center(state: SequenceState, wanted: int | str, instant: int, box_of: BoxOf) -> Vector:
-    """The middle of a thing, by its id or its model's key, at an instant."""
+    """The centre of a thing, given by its id or its model's key, at an instant."""
     pairs = zip(state.things, state.moving, strict=True)
     thing, moving = next((pair for pair in pairs if wanted in (pair[0].id, pair[0].model.key)), (None, None))
     if thing is None:

@@ -17,7 +17,7 @@ from viewsphere.validation.errors import error_at, shown
 
 
 class At(Frozen):
-    """A direction and a distance, as cameras stand."""
+    """A position given by a direction and a distance, as for cameras."""
 
     azimuth: Coordinate = Field(default=0.0, description="degrees, as for cameras")
     elevation: Drawn[Annotated[float, Field(strict=True, ge=-90, le=90)]] = Field(
@@ -33,7 +33,7 @@ class Lamp(entry_of(Light)):
 
 
 class Placed(entry_of(PlacedLight, optional=("position",)), Lamp):
-    """A lamp that stands somewhere."""
+    """A lamp with a position."""
 
     at: At | None = Field(default=None, description="or {azimuth, elevation, distance} from there, as for cameras")
 
@@ -46,7 +46,7 @@ class Placed(entry_of(PlacedLight, optional=("position",)), Lamp):
 
 
 class Aimed(entry_of(AimedLight), Placed):
-    """A lamp that points somewhere: two places give the direction."""
+    """A lamp with a direction, given by two positions."""
 
     @model_validator(mode="after")
     def _pointed(self) -> Aimed:
@@ -59,7 +59,7 @@ class Aimed(entry_of(AimedLight), Placed):
 
 
 def _standing(at: At) -> Any:
-    """The point (x, y, z) that `at` means, metres; None if `at` contains distributions."""
+    """The point (x, y, z) of `at`, metres; None if `at` contains distributions."""
     return None if is_random(at) else tuple(round(x, 9) + 0.0 for x in _point(at))
 
 
@@ -74,7 +74,7 @@ def place_of(lamp: Placed) -> Vector:
 
 
 def emitter(lamp: Lamp) -> Any:
-    """The light of a lamp whose fields are those of a light of the scene."""
+    """The light of a lamp that has the same fields as the scene's light."""
     at = getattr(lamp, "at", None)
     return concrete(lamp) if at is None else concrete(lamp, position=_point(at))
 

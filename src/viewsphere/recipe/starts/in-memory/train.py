@@ -1,6 +1,6 @@
-"""Trains on pictures that are rendered as they are asked for, without a disk: python train.py
+"""Trains on pictures that are rendered on demand, without a disk: python train.py
 
-The stand-in for a network learns from how many pixels a car covers how far away they are on average.
+The stand-in for a network learns the mean depth of a car's pixels from their number.
 """
 
 from pathlib import Path

@@ -18,7 +18,7 @@ for sample in vs.open(sys.argv[1]):
         row = [*thing.quaternion, *t, thing.visibility]  # the quaternion is R's, w first
         print(f"{sample.index},{thing.id},{thing.category},{','.join(f'{value:.6f}' for value in row)}")
 
-        # The pose, tried: the box's corners go through R, t and K to where the picture has them.
+        # A check of the pose: R, t and K project the box's corners to their pixels.
         in_camera = thing.box3d_object @ R.T + t
         pixels = in_camera @ sample.camera.K.T
         pixels = pixels[:, :2] / pixels[:, 2:]
