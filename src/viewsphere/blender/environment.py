@@ -1,4 +1,4 @@
-"""A Python environment that holds Blender and nothing else, made in the user's data folder."""
+"""A Python environment for Blender only, made in the user's data folder."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ from viewsphere.errors import UserError
 from viewsphere.scratch import ScratchDir, sweep
 
 REQUIREMENTS = Path(__file__).with_name("requirements.txt")
-"""The packages and the digests of their files. Pip refuses other files, so that a changed index does no harm."""
+"""The packages and the digests of their files. Pip refuses other files, so a changed index does no harm."""
 
 PINNED = ("--disable-pip-version-check", "--require-hashes", "--only-binary", ":all:")
-"""Options of pip: only files of known digests, and only wheels, which run no program of their own while they are installed."""
+"""Options of pip: only files with known digests, and only wheels, which run no code at installation."""
 
 PREFIX = "blender-making-"
 INSTALL_S = 3600.0
@@ -41,7 +41,7 @@ def make_environment(listener: Listener) -> Path:
     """Make the environment, or make it anew, and return its interpreter.
 
     The environment is built under another name and renamed when complete. `listener` gets a line for each step, and pip's
-    lines. Raises UserError when there is no Python 3.11, or pip cannot install what is needed.
+    lines. Raises UserError if there is no Python 3.11, or if pip cannot install the packages.
     """
     place = home()
     base = _python311()

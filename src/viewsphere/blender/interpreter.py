@@ -19,7 +19,7 @@ from viewsphere.scratch import temporary
 
 VARIABLE = "VIEWSPHERE_BLENDER_PYTHON"
 SCRIPTS = "VIEWSPHERE_ALLOW_SCRIPTS"
-"""The environment variable that lets scripts of recipes run, where it is 1; processes that are started inherit it."""
+"""The environment variable that allows scripts of recipes if it is 1; child processes inherit it."""
 
 INSTALL = "pip install 'viewsphere[blender]' in Python 3.11, or run viewsphere doctor --setup-blender"
 GRAPHICS = (
@@ -53,7 +53,7 @@ PACKAGES = {
     "libxcb.so.1": "libxcb1",
     "libxkbcommon.so.0": "libxkbcommon0",
 }
-"""Debian's and Ubuntu's packages of the libraries that Blender takes from the system."""
+"""Debian's and Ubuntu's packages for the system libraries that Blender needs."""
 
 
 @dataclass(frozen=True)
@@ -66,7 +66,7 @@ class Device:
 
 @dataclass(frozen=True)
 class Library:
-    """A missing system library, and the Debian or Ubuntu package that brings it, where the package is known."""
+    """A missing system library, and the Debian or Ubuntu package that contains it, if known."""
 
     name: str
     package: str | None
@@ -74,7 +74,7 @@ class Library:
 
 @dataclass(frozen=True)
 class Graphics:
-    """The OpenGL driver that EEVEE and Workbench draw with, where the driver is known; or why they cannot draw."""
+    """The OpenGL driver of EEVEE and Workbench, if known; or the reason why they cannot draw."""
 
     driver: str | None = None
     problem: str | None = None
@@ -93,7 +93,7 @@ class Blender:
 
     @property
     def cure(self) -> str | None:
-        """The command that brings the missing libraries on Debian and Ubuntu; None where none is known."""
+        """The command that installs the missing libraries on Debian and Ubuntu; None if unknown."""
         packages = sorted({library.package for library in self.missing if library.package})
         return f"apt-get install {' '.join(packages)}" if packages else None
 
@@ -138,7 +138,7 @@ def _graphics(process: BlenderProcess) -> Graphics:
 
 
 def missing_libraries(said: str) -> tuple[Library, ...]:
-    """The libraries that `ldd`, or the error of an import, says are not found."""
+    """The missing libraries in the output of `ldd` or in the error of an import."""
     patterns = r"^\s*(\S+) => not found", r"(\S+\.so[\d.]*): cannot open shared object file"
     names = {name for pattern in patterns for name in re.findall(pattern, said, re.MULTILINE)}
     return tuple(Library(name, PACKAGES.get(name)) for name in sorted(names))
@@ -158,7 +158,7 @@ def _program(given: str, place: str) -> Path:
 
 
 def _broken(python: Path, error: str) -> Blender:
-    """A Blender that did not start, and why: no bpy at all, missing system libraries, or another error."""
+    """A Blender that did not start, with the reason: no bpy, missing system libraries, or another error."""
     if "No module named 'bpy'" in error:
         return Blender(python, problem=f"it has no bpy: {INSTALL}")
     missing = missing_libraries(error + "\n" + _ldd(_module(python)))

@@ -2,8 +2,8 @@
 
 The Blender process runs `worker/` in the interpreter that has bpy, with factory settings, and with nothing of this process's
 Python or of the user's Blender: neither add-ons nor scripts. Requests and answers are JSON, a line each, over the process's
-standard input and output; arrays lie in files of a folder that both sides know. Blender's other output goes to a log. When
-this process ends, in whatever way, Blender's standard input closes: Blender then removes the folder and ends, too.
+standard input and output; arrays are in files of a shared folder. Blender's other output goes to a log. When
+this process ends, in whatever way, Blender's standard input closes; Blender then removes the folder and ends as well.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ runpy.run_module("worker", run_name="__main__", alter_sys=True)
 
 ANSWER_S = 120.0
 GRACE_S = 3.0
-"""Seconds that Blender has to end by itself once its input is closed; an idle Blender takes a few milliseconds."""
+"""Seconds for Blender to end by itself once its input is closed; an idle Blender takes a few milliseconds."""
 
 MEMORY = Path("/dev/shm")
 LEAST_MEMORY = 2 << 30
@@ -55,10 +55,10 @@ class BlenderProcess:
     """A Blender process, started at once and owned by this object; only one thread at a time may use it.
 
     `python` is an interpreter that has bpy (`find_blender`). Blender's output is appended to the file `log`, by default
-    one that is deleted with the process. Arrays and other files for Blender lie in `folder`, which is deleted with it, too.
-    With `readable`, Blender reads only what lies in these folders, where the system can enforce it (Linux 5.13 and later), and
-    ends with the thread that starts it; its `folder` then lies among this process's temporary files. Blender works with this
-    many `threads`, 0 for one a core.
+    one that is deleted with the process. Arrays and other files for Blender are in `folder`, which is also deleted with it.
+    With `readable`, Blender reads only these folders, if the system can enforce this (Linux 5.13 and later), and ends with the
+    thread that starts it; its `folder` is then among this process's temporary files. `threads` is Blender's number of threads,
+    0 for one per core.
     """
 
     def __init__(self, python: Path, log: Path | None = None, readable: Sequence[Path] | None = None, threads: int = 0) -> None:
@@ -120,7 +120,7 @@ class BlenderProcess:
         try:
             answer = self._exchange(request)
         except BaseException:
-            _kill(self._process)  # a late answer would be taken for the next request's
+            _kill(self._process)  # a late answer would be read as the next request's answer
             raise
         finally:
             timer.cancel()
@@ -154,7 +154,7 @@ class BlenderProcess:
         self._put.clear()
 
     def _died(self, do: str, seconds: float, timeout_s: float) -> BlenderDied:
-        """The error that says, in one line, how Blender ended."""
+        """The error that describes, in one line, how Blender ended."""
         try:
             status = self._process.wait(GRACE_S)
         except subprocess.TimeoutExpired:
@@ -222,7 +222,7 @@ def _environment(python: Path, folder: Path) -> dict[str, str]:
 
 
 def _memory() -> Path:
-    """A place for large arrays: `MEMORY` where enough of it is free, else that of temporary files."""
+    """The folder for large arrays: `MEMORY` if enough of it is free, else the folder of temporary files."""
     with suppress(OSError):
         if os.access(MEMORY, os.W_OK) and shutil.disk_usage(MEMORY).free >= LEAST_MEMORY:
             return MEMORY

@@ -27,13 +27,13 @@ from viewsphere.store.shots.checksums import damaged_files
 Value = TypeVar("Value", int, str)
 
 FEWEST = 128
-"""Frames for which a process of their own is worth its start."""
+"""Number of frames from which a separate process is worth its start."""
 
 DRAWN_AGAIN = ("min_visibility", "wanted")
-"""Fields of recipes whose frames are judged, and drawn again up to 32 times, while they are composed."""
+"""Fields of recipes that redraw frames up to 32 times while they are composed."""
 
 FEW_SHOTS = 4
-"""Shots of such recipes that are composed again: each takes as long as a second of rendering."""
+"""Number of shots of such recipes that are recomposed: each takes as long as a second of rendering."""
 
 
 def check(
@@ -49,17 +49,17 @@ def check(
 ) -> Report:
     """Prove the finished frames of a data set, and all its exports. Nothing is changed.
 
-    Every file is compared with its digest, and nothing may lie in the store that the plan does not name. Every frame is read
-    whole, or with `frames` at most so many, spread evenly; the exports are then left to a whole check.
+    Every file is compared with its digest, and the store may contain nothing that the plan does not name. Every frame is read
+    completely. With `frames`, at most this number is read, spread evenly, and exports are left to a full check.
 
-    The plan, `sample` models and the shots of `sample` frames, spread evenly (None: all), are made again by the stored recipe
-    and compared whole. Of the same frames all labels are computed again from the exported models, and stored depth is lifted to
-    points and compared with rays that Embree casts at these models: `rays` False leaves that out, None does too where embreex
-    is not installed. `repaint` frames (None: all) are painted again. Of `against_cycles` frames instance maps are compared with
-    Cycles' own pass of object indices.
+    The plan, `sample` models and the shots of `sample` frames, spread evenly (None: all), are remade from the stored recipe and
+    compared completely. For the same frames, all labels are recomputed from the exported models. Their stored depth is lifted
+    to points and compared with rays that Embree casts at these models. `rays` False skips the rays; None skips them if embreex
+    is not installed. `repaint` frames (None: all) are painted again. The instance maps of `against_cycles` frames are compared
+    with Cycles' own pass of object indices.
 
-    `workers` 0 proves all in the calling process. `fast` compares digests alone, of the store and of exports, as fast as they
-    are read, and what is there with the plan. The report lists each proof that did not run, and why.
+    `workers` 0 does everything in the calling process. `fast` compares only the digests of the store and of exports, and the
+    content of the store with the plan. The report lists each proof that did not run, with the reason.
 
     Raises MissingExtraError for `rays` True without embreex, and, before any work, for `against_cycles` without Blender.
     """
@@ -83,7 +83,7 @@ def check(
 
 
 def _of_store(dataset: Dataset) -> tuple[Report, bool]:
-    """The proofs of what lies in the store, and whether the records of models can be read."""
+    """The proofs of the store's content, and whether the records of models can be read."""
     notes: list[str] = []
     files, damage = damaged(dataset)
     findings = [Finding("digests", None, message) for messages in damage.values() for message in messages]
@@ -102,7 +102,7 @@ def _of_store(dataset: Dataset) -> tuple[Report, bool]:
 
 
 def _of_digests(dataset: Dataset) -> Report:
-    """The digests of exports; nothing in their files is read."""
+    """The proof of exports by digests only."""
     names = exports(dataset)
     findings = [Finding(name, None, message) for name in names for message in damaged_files(dataset.root / name)]
     not_run = {"labels, plan, models": "only digests were compared, check without --fast"}
@@ -118,7 +118,7 @@ def _of_models(dataset: Dataset) -> Report:
 
 
 def _of_recipes(dataset: Dataset, recomputed: Recomputed, sample: int | None) -> Report:
-    """The proofs that the plan, models' records and what was left out are as the recipes give them; of so many models."""
+    """The proofs that the plan, the left-out parts and the records of `sample` models follow from the recipes."""
     sources, untried = Sources(dataset, recomputed), list[str]()
     findings = [Finding("plan", None, message) for message in recomputed.of_plan()]
     keys = dataset.plan.models
@@ -140,14 +140,14 @@ def _kept(values: Mapping[str, Value]) -> dict[str, Value]:
 
 
 def _alone(dataset: Dataset) -> str:
-    """The reason why labels of some frames cannot be computed again: nothing is stored of them but their records."""
+    """The reason why labels of some frames cannot be recomputed: only their records are stored."""
     folder_of = dataset.store.shot_folder
     frames = sum(row.count for row in dataset.rows if not (folder_of(row.key) / "shot.json").exists())
     return f"{frames:,} frames came without their shots" if frames else ""
 
 
 def _chosen(dataset: Dataset, positions: range, sample: int | None, repaint: int | None, rays: bool | None) -> Chosen:
-    """The frames that are computed and painted again, and the shots that are composed again."""
+    """The frames to recompute and repaint, and the shots to recompose."""
     computed, painted = _spread(positions, sample), _spread(positions, repaint)
     places: dict[str, int] = {}
     for position, _, frame in indices_at(dataset, computed):
@@ -160,7 +160,7 @@ def _chosen(dataset: Dataset, positions: range, sample: int | None, repaint: int
 
 
 def _covered(report: Report, dataset: Dataset, chosen: Chosen, read: int) -> Report:
-    """The report with the numbers of frames that proofs of some frames cover, and proofs that found nothing to look at."""
+    """The report with the coverage of proofs that check only some frames, and with proofs that had nothing to check."""
     total, checked = len(dataset), report.checked
     shots = checked.get("recipe", 0)
     coverage = [
@@ -185,7 +185,7 @@ def _by_cycles(compared: Compared, dataset: Dataset, positions: range) -> Report
 
 
 def _spread(positions: range, most: int | None) -> range:
-    """At most so many of the positions, spread evenly; None: all."""
+    """At most `most` of the positions, spread evenly; None: all."""
     return positions if most is None else positions[:: max(1, -(-len(positions) // most))] if most else positions[:0]
 
 
@@ -206,7 +206,7 @@ def _reports(
 
 
 def _prover(dataset: Dataset, chosen: Chosen, recomputed: Recomputed | None = None) -> Callable[[range | str], Report]:
-    """Proves the frames at some positions, or the export of a name."""
+    """The function that proves the frames at some positions, or the export of a name."""
 
     def prove(asked: range | str) -> Report:
         if isinstance(asked, str):

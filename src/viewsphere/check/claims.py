@@ -1,4 +1,4 @@
-"""Proof that nothing lies in the store that nothing claims, and that what was left out is missing."""
+"""Proof that the store contains no unclaimed files, and that left-out models and shots are missing."""
 
 from __future__ import annotations
 
@@ -13,17 +13,17 @@ from viewsphere.store.samples.simulated import MADE
 from viewsphere.store.shots.manifest import MANIFEST, SHARD, Manifest
 
 OF_STORE = frozenset({"plan.json", "skipped.json", "lock", "models", "shots", "simulated", "writing", "failed"})
-"""Names of what lies in a store's folder."""
+"""Names of the entries in a store's folder."""
 
 OF_SHOT = frozenset({"frames.json", "shot.json", "scenery.json", MANIFEST, SHARD})
-"""Names of a shot's files that are no channel's."""
+"""Names of a shot's files that do not belong to a channel."""
 
 NUMBERED = re.compile(r"(\w+)/(\d{8,})\.\w+")
-"""A channel's file, by its path in its shot's folder: the channel and the frame."""
+"""The path of a channel's file in its shot's folder, with the channel and the frame."""
 
 
 def unclaimed(dataset: Dataset) -> Iterator[str]:
-    """Files and folders of the store that the plan does not ask for. Files of models are compared where these are made."""
+    """Files and folders of the store that the plan does not contain. The files of models are compared elsewhere."""
     store = dataset.store
     yield from _others(store.folder, lambda path: path.name in OF_STORE)
     yield from _others(store.folder / "models", lambda path: path.is_dir() and path.name in dataset.plan.models)
@@ -34,7 +34,7 @@ def unclaimed(dataset: Dataset) -> Iterator[str]:
 
 
 def _of_shots(dataset: Dataset, group: Path) -> Iterator[str]:
-    """Folders that no shot of the plan has, and files in the others."""
+    """Folders that belong to no shot of the plan, and unclaimed files in the other folders."""
     if not group.is_dir():
         yield _no_such(group)
         return
@@ -47,12 +47,12 @@ def _of_shots(dataset: Dataset, group: Path) -> Iterator[str]:
 
 
 def _of_shot(dataset: Dataset, row: Row, folder: Path) -> Iterator[str]:
-    """Files of a shot that none of its frames' channels claims, and second files of one channel and frame."""
+    """Files of a shot that belong to no channel of its frames, and second files for one channel and frame."""
     try:
         paths = Manifest.read(folder).seals
         claimed = _claimed(dataset, row)
     except StoreError:
-        return  # damage, which others find
+        return  # damage, which other proofs report
     held = set[tuple[str, int]]()
     for path in paths:
         match = NUMBERED.fullmatch(path)
@@ -64,7 +64,7 @@ def _of_shot(dataset: Dataset, row: Row, folder: Path) -> Iterator[str]:
 
 
 def _claimed(dataset: Dataset, row: Row) -> set[tuple[str, int]]:
-    """Channels and frames of which a shot holds files: of several sensors those that each keeps."""
+    """Channels and frames for which a shot has files; each sensor has its own channels."""
     part = dataset.plan.parts[row.part]
     shot = dataset.store.labelled(row.key) if part.recipe.get("rig") and not part.merged else None
     if shot is not None:
@@ -73,8 +73,8 @@ def _claimed(dataset: Dataset, row: Row) -> set[tuple[str, int]]:
 
 
 def left_out(dataset: Dataset, sources: Sources, untried: list[str]) -> Iterator[str]:
-    """Contradictions of skipped.json: names that the plan lacks, shots that are there, and models that can be made. `untried`
-    gets the names whose reason cannot be tried again.
+    """Contradictions of skipped.json: names that the plan lacks, shots that exist, and models that can be made. Names whose
+    reason cannot be tested again are added to `untried`.
     """
     plan, store, skipped = dataset.plan, dataset.store, dataset.store.skipped()
     finished = [row for key in store.finished() if (row := plan.find(key)) is not None] if skipped else []

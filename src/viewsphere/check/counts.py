@@ -1,4 +1,4 @@
-"""Proof that the frames and models that the plan asks for are there, and that the credits are the models'."""
+"""Proof that the plan's frames and models exist, and that the credits match the models."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from viewsphere.store.credits import credits_problem
 
 
 def missing(dataset: Dataset, notes: list[str]) -> Iterator[str]:
-    """Frames and models that the plan asks for and the store lacks; what a run left out on purpose is noted."""
+    """Frames and models of the plan that the store lacks; those left out on purpose become notes."""
     plan, store = dataset.plan, dataset.store
     skipped = store.skipped()
     notes += [f"{key} was left out: {reason}" for key, reason in skipped.items()]
@@ -28,7 +28,7 @@ def missing(dataset: Dataset, notes: list[str]) -> Iterator[str]:
 
 
 def lacking_models(dataset: Dataset) -> list[str]:
-    """Keys of the models that the plan asks for, and that were not left out on purpose, of which there is nothing."""
+    """Keys of the plan's models that are missing and were not left out on purpose."""
     skipped, folder = dataset.store.skipped(), dataset.store.model_folder
     return [key for key in dataset.plan.models if key not in skipped and not (folder(key) / "model.json").is_file()]
 
@@ -41,7 +41,7 @@ def credits(dataset: Dataset) -> Iterator[str]:
 
 
 def _missing_shots(dataset: Dataset) -> Iterator[str]:
-    """The missing frames of each part, and of the channels that each one added to others."""
+    """The missing frames of each part, and the missing channels that a part adds to other parts' frames."""
     plan, store = dataset.plan, dataset.store
     for gap in store.gaps(plan):
         what = _factors(plan)

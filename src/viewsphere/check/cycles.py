@@ -1,4 +1,4 @@
-"""Frames compared with Cycles' own pass of object indices: a renderer that knows nothing of viewsphere's rasteriser."""
+"""Frames compared with Cycles' own pass of object indices: a renderer independent of viewsphere's rasteriser."""
 
 from __future__ import annotations
 
@@ -22,14 +22,14 @@ from viewsphere.store import Dataset
 
 
 class Compared:
-    """Compares samples with what Cycles sees; counts the pixels that differ, and those on edges, which may.
+    """Compares samples with Cycles' view; counts the pixels that differ, and separately those on edges, which may differ.
 
-    Both look through the middles of pixels, Cycles in single precision: a pixel may differ whose neighbour, of the eight around
-    it, is of the object that Cycles sees.
+    Both sample the centres of pixels, Cycles in single precision. A pixel may differ if one of its eight neighbours shows the
+    object that Cycles sees.
     """
 
     def __init__(self, dataset: Dataset) -> None:
-        """Raises UserError where one of the recipes' Blenders, or the default one, cannot be used."""
+        """Prepare the comparison. Raises UserError if a recipe's Blender, or the default one, cannot be used."""
         self._dataset, self._scenery = dataset, Scenery(dataset)
         self._engine = plugins.load(EngineSpec, "cycles")
         self.frames, self.pixels, self.edges = 0, 0, 0
@@ -40,7 +40,7 @@ class Compared:
     def differences(self, sample: Sample) -> Iterator[str]:
         """Yield the differences of Cycles' view from the sample's instance map, beyond edges, or the file that cannot be read.
 
-        Raises UserError where Blender does not answer.
+        Raises UserError if Blender does not answer.
         """
         try:
             asked = self._asked(sample)
@@ -70,8 +70,8 @@ class Compared:
             )
 
     def _asked(self, sample: Sample) -> tuple[NDArray[np.int32], Shot, int, int, Load] | None:
-        """The instance map that is kept, and what Cycles is asked for: shot, instant, sensor and models; None where that is not
-        known, or not what it was.
+        """The stored instance map, and the request for Cycles: shot, instant, sensor and models. None if these are unknown or
+        have changed.
         """
         key = self._scenery.key_of(sample.index)
         shot = self._dataset.store.shot(key)
@@ -87,7 +87,7 @@ class Compared:
         kept, load = kept_map(sample), StoredModels.of(self._dataset, now, sample)
         for thing in now.objects:
             if thing.is_there:
-                load(thing.model, thing.step)  # here damage is told from a Blender that does not answer
+                load(thing.model, thing.step)  # loaded here to distinguish damage from a Blender that does not answer
         return kept, now, instant, sensor, load
 
     def note(self) -> str:
@@ -97,18 +97,18 @@ class Compared:
 
 
 def _own_python(recipe: Mapping[str, Any]) -> str | None:
-    """The interpreter whose Blender a recipe names for Cycles, None: the default one."""
+    """The interpreter of the Blender that a recipe names for Cycles; None for the default one."""
     engine = engine_entry(recipe.get("engine", {}))
     return engine.get("python") if engine.get("name") == "cycles" else None
 
 
 def kept_map(sample: Sample) -> NDArray[np.int32]:
-    """The ids that a sample's instance map has, (H, W) int32."""
+    """The ids in a sample's instance map, (H, W) int32."""
     return sample.channels["instances"].astype(np.int32)
 
 
 def near(kept: NDArray[np.int32], seen: NDArray[np.int32]) -> NDArray[np.bool_]:
-    """Return whether a pixel of `kept` (H, W), or one of the eight around it, is what is seen there (H, W)."""
+    """Return a mask: True where a pixel of `kept` (H, W), or one of its eight neighbours, equals the pixel of `seen` (H, W)."""
     padded = np.pad(kept, 1, mode="edge")
     height, width = kept.shape
     mask = np.zeros(kept.shape, np.bool_)

@@ -1,4 +1,4 @@
-"""Proof that no file of the store was changed since it was written: sizes and digests against the manifests."""
+"""Proof that no file of the store has changed since it was written, by sizes and digests in the manifests."""
 
 from __future__ import annotations
 

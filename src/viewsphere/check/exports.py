@@ -1,4 +1,4 @@
-"""Proof of a data set's exports: digests, and what each format compares."""
+"""Proof of a data set's exports: their digests, and each format's own check."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def exports(dataset: Dataset) -> tuple[str, ...]:
 
 
 def export_report(dataset: Dataset, sampled: Collection[int], name: str) -> Report:
-    """The findings in an export, by digests and by its format."""
+    """The findings in an export, from its digests and its format's check."""
     folder = dataset.root / name
     proof: list[Remark] = [(None, message) for message in damaged_files(folder)]
     try:
@@ -41,7 +41,7 @@ def export_report(dataset: Dataset, sampled: Collection[int], name: str) -> Repo
 
 
 def _contents(views: Views, folder: Path, verify: Verify, sampled: Collection[int]) -> Iterator[Remark]:
-    """The findings of an export's format; a proof that breaks off is one."""
+    """The findings of the format's check; a proof that breaks off counts as a finding."""
     try:
         entry = FormatEntry(name=folder.name, options=written_options(folder))
         with here(folder) as local:

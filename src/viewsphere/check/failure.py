@@ -15,7 +15,7 @@ _BY_DATA = (
 
 
 def failure(expected: str, error: Exception) -> str:
-    """That something else than `expected` was found; for an exception that data does not cause, that the check is at fault."""
+    """The message that `expected` was not found, or, for an exception that data cannot cause, that the check is at fault."""
     found = f"{type(error).__name__}: {first_of(error) if isinstance(error, ValidationError) else error}"
     by_data = isinstance(error, _BY_DATA) or type(error) is Exception  # pycocotools raises bare ones for wrong polygons
     return f"expected {expected}, found {found}" if by_data else f"the check itself failed: {found}"

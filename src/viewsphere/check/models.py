@@ -1,4 +1,4 @@
-"""Proof that a model's files say the same: the OBJ with its materials and textures, the GLB, and what is known of the model."""
+"""Proof that a model's files agree: the OBJ with its materials and textures, the GLB, and the model's record."""
 
 from __future__ import annotations
 
@@ -28,14 +28,14 @@ from viewsphere.store import Category, Dataset, ModelInfo
 from viewsphere.store.shots.manifest import MANIFEST
 
 PRECISION = 1e-12
-"""Share of a number by which texts may differ: brightness above 1 is kept as a product in a GLB."""
+"""Relative difference allowed between numbers in texts: a GLB stores brightness above 1 as a product."""
 
 Finding = tuple[str, str]
-"""A model's key, and what is wrong with it."""
+"""A model's key, and its error."""
 
 
 def differing(dataset: Dataset, notes: list[str]) -> Iterator[Finding]:
-    """Models whose files contradict one another; `notes` gets those that were exported elsewhere."""
+    """Models whose files contradict one another; models that were exported elsewhere are added to `notes`."""
     is_imported = any(not part.settings for part in dataset.plan.parts)
     categories = {category.id: category for category in dataset.categories}
     named: dict[str, set[str]] = {}
@@ -56,12 +56,12 @@ def differing(dataset: Dataset, notes: list[str]) -> Iterator[Finding]:
 
 
 def owner(info: ModelInfo) -> str:
-    """The key of the model that a time step is of; a model's own."""
+    """The key of the model that a time step belongs to; otherwise the model's own key."""
     return info.track or info.key
 
 
 def _problems(dataset: Dataset, info: ModelInfo, categories: dict[int, Category], names: set[str]) -> Iterator[str]:
-    """Contradictions of a model's files; `names` gets those of the files that belong to it."""
+    """Contradictions between a model's files; the names of its files are added to `names`."""
     folder, known = dataset.path(info.obj).parent, categories.get(info.category_id)
     mesh = read_exported(dataset.path(info.glb), info.parts, info.node, whole=True)
     yield from _facts(info, mesh)
@@ -115,7 +115,7 @@ def _facts(info: ModelInfo, mesh: Mesh) -> Iterator[str]:
 
 
 def _compared(wanted: Path, found: Path) -> Iterator[str]:
-    """The first difference of a file from what the GLB's mesh gives."""
+    """The first difference of a file from the one made from the GLB's mesh."""
     if not found.is_file():
         yield f"{found.name}: expected the file that the GLB's mesh gives, found none"
     elif read_bytes(wanted) != read_bytes(found):
@@ -131,7 +131,7 @@ def _lines(wanted: Path, found: Path) -> Iterator[str]:
 
 
 def _is_same_line(one: str, other: str) -> bool:
-    """Return whether two lines hold the same words, and numbers that are the same but for rounding."""
+    """Return whether two lines have the same words and, except for rounding, the same numbers."""
     words = one.split(), other.split()
     return len(words[0]) == len(words[1]) and all(a == b or _is_same_number(a, b) for a, b in zip(*words, strict=True))
 
@@ -144,7 +144,7 @@ def _is_same_number(one: str, other: str) -> bool:
 
 
 def _pixels(wanted: Path, found: Path) -> Iterator[str]:
-    """Another version of the encoder may have written the same texture in other bytes."""
+    """The first difference of two textures' pixels, because another version of the encoder may write different bytes."""
     try:
         same = np.array_equal(decode_png(read_bytes(wanted)), decode_png(read_bytes(found)))
         if not same:

@@ -1,4 +1,4 @@
-"""Damaged shots, models and exports of a data set are made again; what is whole is not touched."""
+"""The repair of damaged shots, models and exports of a data set; intact ones are not touched."""
 
 from __future__ import annotations
 
@@ -23,19 +23,19 @@ from viewsphere.store.credits import CREDITS, write_credits
 
 @dataclass(frozen=True)
 class Repaired:
-    """The repairs, in words, and the report of `check` on the data set now; failed repairs are findings."""
+    """The repairs, in words, and the report of `check` on the repaired data set; failed repairs are findings."""
 
     done: tuple[str, ...]
     report: Report
 
 
 def repair(root: Path | str, *, workers: int = 0, listener: Listener | None = None, **options: Any) -> Repaired:
-    """Check a data set, and make again what is not as it was: models, shots that are damaged, are missing or do not agree with
-    what is computed again, and exports. `options` are those of `check`.
+    """Check a data set, and remake models, shots and exports that have changed. Shots are remade if they are damaged or
+    missing, or if they contradict recomputed values. `options` are those of `check`.
 
-    A shot is rendered by its part's recipe, whose models have to be what they were; it takes the place of the damaged one when
-    it is whole and equal to what the manifest says of it. What cannot be made again stays as it is. `workers` 0 does all in the
-    calling process. Raises StoreError where there is no plan that can be read.
+    A shot is rendered from its part's recipe, whose models must be unchanged. It replaces the damaged shot when it is complete
+    and matches the manifest. Files that cannot be remade do not change. `workers` 0 does everything in the calling process.
+    Raises StoreError if there is no readable plan.
     """
     dataset = Dataset(root)
     mending = _Mending(dataset, Mender(dataset.store, dataset.plan, workers, listener or null_listener))
@@ -61,7 +61,7 @@ class _Mending:
         self._tried: set[str] = set()
 
     def damaged_models(self) -> Iterator[str]:
-        """Keys of models that were changed, are missing, or contradict one another or their source."""
+        """Keys of models that have changed, are missing, or contradict one another or their source."""
         plan, store = self._dataset.plan, self._dataset.store
         folders = damaged(self._dataset)[1]
         keys = {key for key in plan.models if store.model_folder(key) in folders}.union(lacking_models(self._dataset))
@@ -71,7 +71,7 @@ class _Mending:
         return (key for key in plan.models if key in keys)
 
     def damaged_shots(self) -> Iterator[str]:
-        """Keys of shots that are not as they were written, or are missing."""
+        """Keys of shots that have changed since they were written, or are missing."""
         store, folders, plan = self._dataset.store, damaged(self._dataset)[1], self._dataset.plan
         missing, most = sum(gap.shots for gap in store.gaps(plan)), limits.MAX_REPAIRED_SHOTS
         if missing > most:
@@ -82,11 +82,11 @@ class _Mending:
         return (key for key in wanted if store.shot_folder(key) in folders or not store.has_shot(key))
 
     def models(self, keys: Iterable[str]) -> bool:
-        """Make them again; whether any was not tried before."""
+        """Remake the models; returns whether any of them was not tried before."""
         return self._note("model", "made again", keys, self._mender.models)
 
     def shots(self, keys: Iterable[str]) -> None:
-        """Render them again."""
+        """Render the shots again."""
         self._note("shot", "rendered again", keys, self._mender.shots)
 
     def _note(self, what: str, how: str, keys: Iterable[str], mend: Any) -> bool:
@@ -98,14 +98,14 @@ class _Mending:
         return bool(wanted)
 
     def credits(self, findings: Iterable[Finding]) -> None:
-        """Write the file of credits again if it is not what the models' records say."""
+        """Rewrite the file of credits if it does not match the models' records."""
         if any(finding.check == "credits" for finding in findings):
             write_credits(Dataset(self._dataset.root))
             self.done.append(f"{CREDITS}: written again")
 
     def exports(self, findings: Iterable[Finding]) -> None:
-        """Write those again of which something was found: also where their files are links of what was damaged. While frames
-        cannot be made again, exports stay: they may hold the last copy.
+        """Rewrite exports with findings, also if their files are links to damaged files. If frames cannot be remade, exports
+        stay, because they may contain the last copy.
         """
         names = set(exports(self._dataset)) & {finding.check for finding in findings}
         lost = bool(self.refused) or any(finding.check == "counts" for finding in findings)
@@ -122,7 +122,7 @@ class _Mending:
 
 
 def _found_shots(dataset: Dataset, findings: Iterable[Finding]) -> Iterator[str]:
-    """Keys of the shots that findings are about; where a channel was added to a frame later, it lies in a shot of its own."""
+    """Keys of the shots in findings; a channel that was added to a frame later is in a separate shot."""
     names = exports(dataset)
     for finding in findings:
         if finding.frame is not None and finding.check not in names:

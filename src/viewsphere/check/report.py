@@ -26,8 +26,8 @@ class Finding:
 class Report:
     """The outcome of all proofs.
 
-    `checked` counts the frames, files or models behind each proof. `not_run` gives the reason why a proof did not run, or only
-    on a part. `coverage` holds (proved, of, words) for proofs that look at some frames only. `notes` are remarks on the data.
+    `checked` counts the frames, files or models in each proof. `not_run` gives the reason why a proof did not run, or ran only
+    on a part. `coverage` has (proved, of, words) for proofs that check only some frames. `notes` are remarks on the data.
     """
 
     checked: dict[str, int]
@@ -75,7 +75,7 @@ def in_short(reasons: Iterable[str]) -> str:
 
 
 def _reasons(not_run: Mapping[str, str]) -> str:
-    """Names of proofs, those of one reason together, each reason in parentheses."""
+    """Names of proofs, grouped by reason, with each reason in parentheses."""
     names_of: dict[str, list[str]] = {}
     for name, reason in not_run.items():
         names_of.setdefault(reason, []).append(name)

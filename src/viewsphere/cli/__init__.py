@@ -1,6 +1,6 @@
 """The command line: recipes in, data sets out.
 
-Worker processes import the main program again: so commands are imported only when one of them is run.
+Worker processes import the main program again, so commands are imported only when one of them runs.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ workers. No stage of a frame multiplies large matrices, and sums keep their orde
 
 
 def program() -> NoReturn:
-    """Run the command line as the whole of a process, which ends at once."""
+    """Run the command line as the main program of a process, which ends at once."""
     from viewsphere.run.workers.exit_at_once import exit_at_once
 
     spare_imports()
@@ -73,12 +73,12 @@ def main() -> None:
 
 
 def _stop(*_: object) -> NoReturn:
-    """End as Ctrl-C does, with its message, when a system or a cluster asks for it."""
+    """End as Ctrl-C does, with its message, on a signal from the system or a cluster."""
     raise KeyboardInterrupt
 
 
 def _print_anything() -> None:
-    """Print letters that the output's encoding lacks, as that of a Windows pipe often does, by their numbers."""
+    """Make output print characters missing from its encoding by their numbers, as is often needed for Windows pipes."""
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, TextIOWrapper):
             stream.reconfigure(errors="backslashreplace")

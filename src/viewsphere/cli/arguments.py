@@ -21,7 +21,7 @@ RecipeFile = Annotated[Path, typer.Argument(help="Recipe (YAML).", show_default=
 
 
 def at(path: Path | None) -> Path | None:
-    """The folder of this path, or what is at the URL that it stands for."""
+    """The folder of this path, or the data at its URL."""
     from viewsphere.store import located
 
     return None if path is None else located(path)
@@ -53,7 +53,7 @@ Version = Annotated[
 
 
 def _allow_scripts(allowed: bool) -> bool:
-    """Let scripts of recipes run in this process, and in those that it starts."""
+    """Allow scripts of recipes in this process and its child processes."""
     if allowed:
         from viewsphere.blender.interpreter import SCRIPTS
 
@@ -67,7 +67,7 @@ AllowScripts = Annotated[
 
 
 def _keep(durability: str | None) -> str | None:
-    """Have what is finished kept so in this process, and in those that it starts."""
+    """Set the durability of finished files in this process and its child processes."""
     from viewsphere.store.shots.moving import DURABILITY
     from viewsphere.store.shots.moving import durability as asked
 
@@ -137,7 +137,7 @@ def asked_formats(formats: str | None, option: str = "--format") -> tuple[str, .
 
 
 def with_options(names: Sequence[str], options: Sequence[str] | None) -> tuple[FormatEntry, ...]:
-    """The formats of these names with the options that are set for them; RecipeError names what cannot be set."""
+    """The formats of these names with the options that are set for them; RecipeError names invalid options."""
     from viewsphere.recipe.formats import FormatEntry
     from viewsphere.recipe.reading.extends import parse_change
     from viewsphere.validation.errors import one_of

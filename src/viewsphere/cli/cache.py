@@ -1,4 +1,4 @@
-"""The command `cache`: shows and empties the folder of results that viewsphere can make again."""
+"""The command `cache`: shows and empties the folder of reproducible results."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ def cache(
 
 
 def by_kind(entries: Iterable[Entry]) -> dict[str, Any]:
-    """Of each kind of entries: their number and bytes, and the time of the last use, in seconds since 1970."""
+    """For each kind of entry: number, bytes, and time of the last use in seconds since 1970."""
     from viewsphere.caches import KINDS
 
     kinds = {name: {"files": 0, "bytes": 0, "used": 0.0} for name in KINDS}

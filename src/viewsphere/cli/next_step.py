@@ -1,4 +1,4 @@
-"""Suggests what to type when a command lacks its arguments, with files that lie in this folder."""
+"""Suggestions for a command that lacks its arguments, with files from this folder."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ RECIPES = ("[!.]*.yaml", "[!.]*.yml", "[!.]*/recipe.yaml", "recipes/*.yaml")
 
 
 class Command(TyperCommand):
-    """A command that suggests what to type when it needs arguments and got none."""
+    """A command that suggests arguments if it needs some and got none."""
 
     def parse_args(self, ctx: typer.Context, args: list[str]) -> list[str]:  # pyright: ignore[reportIncompatibleMethodOverride]
         """Parse the arguments by typer; raises UserError with a suggestion if arguments are required and none is given."""

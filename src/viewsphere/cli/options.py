@@ -1,4 +1,4 @@
-"""Mistakes in options, which typer finds, said as all other mistakes are: in one line."""
+"""Errors in options found by typer, reported like all other errors: in one line."""
 
 from __future__ import annotations
 
@@ -41,11 +41,11 @@ def said(error: Any) -> str:
 
 
 def _with_help(message: str, command: str) -> str:
-    """The message and the command that shows help, joined as the message's last character asks."""
+    """The message and the command that shows help, joined according to the message's last character."""
     return f"{message} See {command} -h" if message.endswith("?") else f"{message}: see {command} -h"
 
 
 def _option(error: Any) -> str:
-    """The option or argument whose value cannot be used, as it is written; empty where the mistake is of none."""
+    """The option or argument whose value cannot be used, as it is written; empty if the error concerns none."""
     names: list[str] = getattr(getattr(error, "param", None), "opts", [])
     return max(names, key=len, default="")

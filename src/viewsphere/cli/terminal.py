@@ -35,13 +35,13 @@ if TYPE_CHECKING:
 MOST_FINDINGS = 20
 
 CLOSED = 141
-"""Exit status of a command whose output is not read any more: that of SIGPIPE in a shell."""
+"""Exit status of a command whose output has no reader any more, as for SIGPIPE in a shell."""
 
 
 def say(line: str, *, err: bool = False) -> None:
     """Print a line, its control characters escaped; the only way in which commands print.
 
-    Raises UserError where the output takes no more, as on a full disk, and ends quietly where its reader has ended.
+    Raises UserError if the output accepts no more, as on a full disk; ends quietly if its reader has ended.
     """
     try:
         typer.echo(printable(line), err=err)
@@ -70,7 +70,7 @@ def write_picture(file: Path, picture: Any) -> None:
 
 
 def check_picture(file: Path) -> None:
-    """Raise UserError for a file that is not called a PNG."""
+    """Raise UserError for a file name without the ending of a PNG."""
     if file.suffix.lower() != ".png":
         raise UserError(f"--output: expected a picture that ends in .png; found {file}: {file.with_suffix('.png')}?")
 
@@ -118,7 +118,7 @@ def _size(count: float) -> str:
 
 
 def print_report(report: Report, repaired: Sequence[str] = ()) -> None:
-    """Print the outcome of `check`, after a line for everything that was made again."""
+    """Print the outcome of `check`, after a line for each repair."""
     for line in repaired:
         say(f"repaired: {line}")
     failed = Counter(finding.check for finding in report.findings)
@@ -146,7 +146,7 @@ def _print_warnings(warnings: Warnings) -> None:
 
 
 def _shared(what: str, warnings: Mapping[str, Sequence[str]]) -> Iterator[str]:
-    """Each warning once, behind who it is about."""
+    """Each warning once, after the names that it is about."""
     keys_of: dict[str, list[str]] = {}
     for key, messages in warnings.items():
         for warning in messages:
@@ -199,7 +199,7 @@ def print_plugins(found: Sequence[Installed]) -> None:
 
 
 def print_status(found: Status) -> None:
-    """Print how far a data set is, and the runs at work on it."""
+    """Print the progress of a data set, and the active runs."""
     counts = f"{found.finished:,} finished, {found.under_way:,} under way, {found.left_out:,} left out"
     waiting = found.missing - found.under_way
     say(f"{found.root}: {quantity(found.frames, 'frame')}: {counts}, {waiting:,} missing{_share_done(found)}")
@@ -221,7 +221,7 @@ def print_status(found: Status) -> None:
 
 
 def _some(names: Sequence[str]) -> str:
-    """As many of them as a reader has use for."""
+    """The first few names, and the number of the others."""
     left = len(names) - MOST_FINDINGS
     return ", ".join(names[:MOST_FINDINGS]) + (f" and {left:,} more" if left > 0 else "")
 
@@ -237,13 +237,13 @@ def _who(told: Heartbeat) -> str:
 
 
 def _rate(frames: int, seconds: float) -> str:
-    """Frames a second, to two figures where they are slower than one."""
+    """Frames a second, with two digits if below one."""
     rate = frames / seconds
     return f"{rate:.1f} frames/s" if rate >= 1 else f"{rate:.2g} frames/s"
 
 
 def _say_target() -> None:
-    """Say why kernels are compiled for this processor alone, where they are."""
+    """Print why kernels are compiled only for this processor, if they are."""
     from viewsphere.kernels import build
 
     if build.TARGET.note:
@@ -327,7 +327,7 @@ class ProgressBar:
         return listen
 
     def _say_kernels(self, progress: Progress) -> None:
-        """A line, now and then: compiling takes long, and is no frame that other programs could count."""
+        """Print a line from time to time, because compiling takes long and finishes no frames to count."""
         now = time.monotonic()
         if progress.done in (0, progress.total) or now >= self._said + KERNELS_S:
             self._said = now

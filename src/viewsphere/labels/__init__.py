@@ -1,4 +1,4 @@
-"""Labels: everything computed about a picture from truth's triangles. A file defines `LABEL`, or several `LABELS`.
+"""Labels: everything computed about a picture from its exact geometry. A file defines `LABEL`, or several `LABELS`.
 
 `ChannelLabel`s are arrays of pixels, computed if a recipe's `channels` name them. `ObjectLabel`s are fields of objects,
 `SampleLabel`s of whole pictures; labels on request are computed if a recipe's `annotations` name them. Third parties
@@ -147,7 +147,7 @@ def label_names() -> tuple[str, ...]:
 
 @cache
 def _loadable(name: str) -> LabelSpec | None:
-    """The label of this name; None for one of a third party that cannot be loaded."""
+    """The label of this name; None if it is a third party's and cannot be loaded."""
     try:
         return label_named(name)
     except PluginError:
@@ -158,7 +158,7 @@ def _loadable(name: str) -> LabelSpec | None:
 
 @cache
 def label_named(name: str) -> LabelSpec | None:
-    """The label of this name, None where there is none; loads no other. Raises PluginError for one that cannot be loaded."""
+    """The label of this name, None if there is none; loads no other label. Raises PluginError if it cannot be loaded."""
     if name not in plugins.names("labels"):
         return None
     return plugins.load(LabelSpec, name)
@@ -183,7 +183,7 @@ def channel_labels() -> Table[ChannelLabel]:
 
 @cache
 def object_labels() -> tuple[ObjectLabel, ...]:
-    """Labels of objects, those on request among them."""
+    """Labels of objects, including labels on request."""
     return tuple(label for label in labels().values() if isinstance(label, ObjectLabel))
 
 
@@ -197,8 +197,8 @@ def labels_of(requested: Container[str]) -> tuple[ObjectLabel, ...]:
 
 @cache
 def regular() -> frozenset[str]:
-    """Names of labels that objects may have without a request. The modules' texts tell them apart, so that frames import no
-    label on request: reading 45 files takes 2 ms, importing those labels 100.
+    """Names of labels that objects may have without a request. They are read from the source text of the modules, so that
+    frames import no label on request. Reading 45 files takes 2 ms; importing those labels takes 100 ms.
     """
     texts = {module: _text(module) for module in set(plugins.shipped("labels").values())}
     found = {name for name, module in plugins.shipped("labels").items() if _makes_regular(texts[module])}
@@ -206,14 +206,14 @@ def regular() -> frozenset[str]:
 
 
 def _text(module: str) -> bytes:
-    """The source of a module, which is not imported."""
+    """The source of a module, read without importing the module."""
     found = find_spec(module)
     loader: Any = found and found.loader
     return loader.get_data(found.origin) if found and found.origin else b""
 
 
 def _makes_regular(text: bytes) -> bool:
-    """Return whether a module makes more labels of objects than it puts on request."""
+    """Return whether a module defines any label of objects that is not on request."""
     return text.count(b"ObjectLabel(") + text.count(b"ObjectLabel.from_placement(") > text.count(b"on_request=True")
 
 
@@ -224,7 +224,7 @@ def sample_labels() -> Table[SampleLabel]:
 
 
 def sample_labels_of(requested: Container[str]) -> tuple[SampleLabel, ...]:
-    """The labels of whole pictures that were asked for; imports no others."""
+    """The requested labels of whole pictures; imports no others."""
     found = (_loadable(name) for name in label_names() if name in requested)
     return tuple(label for label in found if isinstance(label, SampleLabel))
 
@@ -243,7 +243,7 @@ def makers() -> Table[ObjectLabel]:
 
 @cache
 def _maker(field: str) -> ObjectLabel | None:
-    """The label of this field; only where no regular label has it are all imported."""
+    """The label of this field. All labels are imported only if no regular label has the field."""
     every = (label for found in (lambda: labels_of(()), object_labels) for label in found())
     return next((label for label in every if any(field == its.name for its in label.fields)), None)
 
@@ -262,7 +262,7 @@ def _channel(name: str) -> Channel | None:
 @cache
 def drawable() -> dict[str, Drawing]:
     """The drawings of all labels and passes that have one, by the name of the label or pass, in alphabetical order."""
-    from viewsphere.labels.shared.drawing.passes import DRAWINGS  # which loads what develops pictures
+    from viewsphere.labels.shared.drawing.passes import DRAWINGS  # loads the code that develops pictures
 
     found = {name: label.drawing for name, label in labels().items() if label.drawing}
     return dict(sorted((found | DRAWINGS).items()))
@@ -280,7 +280,7 @@ def drawings() -> tuple[Drawing, ...]:
 
 def stand_in_for(channels: Container[str]) -> Callable[[Sample, int], Picture] | None:
     """Return the substitute for the picture of samples with these channels, a function of a sample and a size. Returns None
-    where the samples have a picture, or no label has a substitute.
+    if the samples have a picture, or no label has a substitute.
     """
     if picture_of(channels) is not None:
         return None
@@ -289,5 +289,5 @@ def stand_in_for(channels: Container[str]) -> Callable[[Sample, int], Picture] |
 
 
 def is_shown(channels: Container[str]) -> bool:
-    """Return whether samples with these channels have a picture, or something that stands for it."""
+    """Return whether samples with these channels have a picture or a substitute for it."""
     return picture_of(channels) is not None or stand_in_for(channels) is not None

@@ -1,4 +1,4 @@
-"""amodal: all the pixels of an object that lie in the image, those that others hide among them."""
+"""amodal: all pixels of an object inside the image, including those that other objects hide."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def compute(context: LabelContext, i: int) -> Mapping[str, Any]:
 
 
 def restore(counts: str, placement: Placement, o: ObjectAnnotation) -> Mapping[str, Any]:
-    """Both fields, from the run-length code that is kept."""
+    """Both fields, from the stored run-length code."""
     return _fields(placement.camera.height, placement.camera.width, counts)
 
 
@@ -47,7 +47,7 @@ def _fields(height: int, width: int, counts: str) -> Mapping[str, Any]:
 
 
 def prove(sample: Sample, models: Models) -> Iterator[str]:
-    """The mask contains the visible one, at the share that follows from visibility and truncation; the box is tight."""
+    """The mask contains the visible mask, in the proportion given by visibility and truncation; the box is tight."""
     for o in rendered(sample):
         amodal = decode_rle(o.amodal.height, o.amodal.width, o.amodal.counts)
         if amodal.shape != (sample.height, sample.width):

@@ -1,4 +1,4 @@
-"""barycentrics: where in its triangle the seen point is."""
+"""barycentrics: the position of the seen point in its triangle."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ if TYPE_CHECKING:
     from viewsphere.labels.shared.context import LabelContext
 
 TOLERANCE = 1e-5
-"""The largest distance of the sum of weights from 1, as a share of the largest weight. Weights of a ground that reaches to the
-horizon are large, and float32.
+"""The largest deviation of the sum of weights from 1, as a share of the largest weight. On a ground that reaches the horizon,
+the float32 weights are large.
 """
 
 

@@ -25,8 +25,8 @@ TOLERANCE = 1e-9
 
 @dataclass(frozen=True)
 class BirdsEye:
-    """A rectangle on the ground: its centre, its length along the heading and its width across, metres, and the heading: the
-    angle from world x to the object's front, counter-clockwise seen from above, degrees of -180 to 180.
+    """A rectangle on the ground: its centre, its length along the heading, its width across it (metres), and the heading. The
+    heading is the angle from world x to the object's front, counter-clockwise seen from above, in degrees from -180 to 180.
     """
 
     x: float
@@ -37,7 +37,7 @@ class BirdsEye:
 
 
 def of(placement: Placement) -> Mapping[str, Any]:
-    """The rectangle along the object's heading around its box, whose edges may lean; and its corners."""
+    """The rectangle along the object's heading around its box (which may be tilted), and the rectangle's corners."""
     pose = placement.world_from_object
     cos, sin = _heading(pose)
     x, y = transform(pose, placement.box)[:, :2].T
@@ -52,8 +52,8 @@ def of(placement: Placement) -> Mapping[str, Any]:
 
 
 def _heading(pose: Any) -> tuple[float, float]:
-    """The direction of an object's front, -Y, on the ground; of one that faces up or down the way in which its front came
-    there: its bottom's, its top's.
+    """The direction of an object's front, -Y, on the ground. If the object faces up, it is the direction of its bottom; if the
+    object faces down, that of its top.
     """
     x, y = (-pose[:2, 1]).tolist()
     if math.hypot(x, y) <= TOLERANCE:
@@ -63,7 +63,7 @@ def _heading(pose: Any) -> tuple[float, float]:
 
 
 def prove(sample: Sample, models: Models) -> Iterator[str]:
-    """The rectangle holds the world box, touches it on each side, and its corners are its own."""
+    """The rectangle contains the world box and touches it on each side, and the stored corners match the rectangle."""
     for o in rendered(sample):
         told, corners = o.birds_eye, o.birds_eye_corners
         turn = math.radians(told.yaw_deg)
@@ -81,7 +81,7 @@ def prove(sample: Sample, models: Models) -> Iterator[str]:
 
 
 def draw(pen: ImageDraw, sample: Sample, scale: float) -> None:
-    """The rectangle on the height of the box's lowest corner, with a line to its front."""
+    """The rectangle at the height of the box's lowest corner, with a line to its front."""
     for o in sample.objects:
         low = float(o.box3d[:, 2].min())
         corners = np.column_stack([o.birds_eye_corners, np.full(4, low)])

@@ -24,7 +24,7 @@ def compute(context: LabelContext, i: int) -> Mapping[str, Any]:
 
 
 def restore(kept: None, placement: Placement, o: ObjectAnnotation) -> Mapping[str, Any]:
-    """The box of the object's mask, which is kept."""
+    """The box of the object's mask, which is stored."""
     tight = rle_box(o.rle.height, o.rle.width, o.rle.counts)
     return {"box2d": tight and tuple(map(float, tight))}
 

@@ -20,8 +20,8 @@ if TYPE_CHECKING:
 
 
 def compute(context: LabelContext, i: int) -> Mapping[str, Any]:
-    """Both boxes, clipped and unclipped. Where the lens shows only a part of the model, the box includes the centres of its
-    visible pixels, which lie on the model: surface nearer than projected boxes begin is in no other box.
+    """Both boxes, clipped and unclipped. If the lens shows only a part of the model, the box includes the centres of its
+    visible pixels. Otherwise surface nearer than the near limit of projected boxes would be in no box.
     """
     bounds, whole = context.projected[i]
     projected = _clipped(bounds, context.camera)
@@ -38,14 +38,14 @@ def _clipped(bounds: Bounds | None, camera: Camera) -> Bounds | None:
 
 
 def keep(o: ObjectAnnotation) -> Any:
-    """The unclipped box, from which the clipped one follows; without an unclipped box {"cut": the clipped one}."""
+    """The unclipped box, from which the clipped box follows; without an unclipped box, {"cut": the clipped box}."""
     if o.box2d_unclipped is not None:
         return list(o.box2d_unclipped)
     return None if o.box2d_projected is None else {"cut": list(o.box2d_projected)}
 
 
 def restore(kept: Any, placement: Placement, o: ObjectAnnotation) -> Mapping[str, Any]:
-    """Both boxes, from the one that is kept."""
+    """Both boxes, from the stored one."""
     if isinstance(kept, dict):
         return {"box2d_projected": tuple(kept["cut"]), "box2d_unclipped": None}
     bounds = None if kept is None else (kept[0], kept[1], kept[2], kept[3])
@@ -53,7 +53,9 @@ def restore(kept: Any, placement: Placement, o: ObjectAnnotation) -> Mapping[str
 
 
 def prove(sample: Sample, models: Models) -> Iterator[str]:
-    """The projected box holds the visible pixels and is the unclipped box clipped, which lies in the projected 3D box."""
+    """The projected box contains the visible pixels and is the clipped form of the unclipped box, which is inside the projected
+    3D box.
+    """
     for o in rendered(sample):
         tight, around, unclipped = mask_box(o.mask), o.box2d_projected, o.box2d_unclipped
         if tight and (around is None or not _within(tight, around, 1.0)):

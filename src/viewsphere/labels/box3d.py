@@ -23,7 +23,7 @@ METRE_TOLERANCE = 1e-9
 
 
 def of(placement: Placement) -> Mapping[str, Any]:
-    """The model's box, moved to the world, to the camera and projected."""
+    """The model's box in world axes, in camera axes, and projected."""
     in_world = transform(placement.world_from_object, placement.box)
     in_camera = transform(placement.camera_from_world, in_world)
     pixels, _ = project(placement.camera.intrinsics, in_camera)
@@ -53,7 +53,7 @@ def prove(sample: Sample, models: Models) -> Iterator[str]:
 
 
 def _projected(sample: Sample, o: ObjectAnnotation) -> Iterator[str]:
-    """box3d_pixels against P, written out here; a distorted lens has no P, so `project` stands for it."""
+    """Check box3d_pixels against P, written out here; a distorted lens has no P, so `project` replaces it."""
     camera = sample.camera
     homogeneous = np.column_stack([o.box3d, np.ones(8)]) @ camera.P.T
     in_front = homogeneous[:, 2] > 0

@@ -1,4 +1,4 @@
-"""canonical_pose: the representative of all poses in which a symmetric object looks the same."""
+"""canonical_pose: the representative of all poses at which a symmetric object looks the same."""
 
 from __future__ import annotations
 
@@ -24,10 +24,10 @@ if TYPE_CHECKING:
 Float = NDArray[np.float64]
 
 EQUAL = 1e-4
-"""By how much traces and entries of rotations may differ that count as equal: as much as declared symmetries may be off."""
+"""Difference up to which traces and entries of rotations count as equal: the tolerance of declared symmetries."""
 
 ROUNDED = 1e-6
-"""By how much entries of a stored canonical pose may differ from those computed again."""
+"""Tolerated difference between the entries of a stored canonical pose and the recomputed ones."""
 
 
 def of(placement: Placement) -> Mapping[str, Any]:
@@ -44,8 +44,8 @@ def of(placement: Placement) -> Mapping[str, Any]:
 
 
 def nearest(pose: Float, symmetries: Symmetries) -> Float:
-    """The pose (4, 4) after the symmetry that brings its rotation nearest to the identity; of equally near ones the pose whose
-    first entries, row by row, are largest. So it depends on the set of poses that look the same, not on the one given.
+    """The pose (4, 4) after the symmetry that brings its rotation nearest to the identity. Of several equally near poses, it is
+    the one whose first entries, row by row, are largest. So the result depends only on the set of poses that look the same.
     """
     discrete = [compose(pose, np.array(motion)) for motion in (IDENTITY, *symmetries.discrete)]
     poses = np.array([_turned(one, symmetries.continuous) for one in discrete])
@@ -56,12 +56,11 @@ def nearest(pose: Float, symmetries: Symmetries) -> Float:
 
 
 ORDER = (np.eye(3), *np.eye(9).reshape(9, 3, 3))
-"""Sums of a rotation's entries of which the canonical one has the largest: the trace, then each entry."""
+"""Sums of a rotation's entries that the canonical rotation maximises: the trace, then each entry."""
 
 
 def _turned(pose: Float, axes: tuple[Continuous, ...]) -> Float:
-    """The pose after the best turn around an axis; of a ball, which any rotation leaves as it is, with the identity as its
-    rotation.
+    """The pose after the best turn around an axis. A ball, which no rotation changes, gets the identity as its rotation.
     """
     if is_ball(axes):
         offset = np.array(axes[0].offset)
@@ -70,7 +69,7 @@ def _turned(pose: Float, axes: tuple[Continuous, ...]) -> Float:
 
 
 def is_ball(axes: tuple[Continuous, ...]) -> bool:
-    """Return whether a model may be turned around axes that are not parallel, and so in any way."""
+    """Return whether a model is symmetric around non-parallel axes, and so under every rotation."""
     first = np.array(axes[0].axis) if axes else np.zeros(3)
     return any(float(np.abs(np.cross(first, axis.axis)).max()) > 1e-6 for axis in axes)
 
@@ -93,7 +92,7 @@ def _best_turn(rotation: Float, around: Continuous) -> Float:
 
 
 def prove(sample: Sample, models: Models) -> Iterator[str]:
-    """The canonical pose is rigid, no farther from the identity than the pose, and that of the model's symmetries."""
+    """The canonical pose is rigid, no farther from the identity than the pose, and follows from the model's symmetries."""
     for o in rendered(sample):
         pose, turn = o.canonical_pose, o.canonical_pose[:3, :3]
         if np.abs(turn @ turn.T - np.eye(3)).max() > 1e-6 or np.linalg.det(turn) < 0 or list(pose[3]) != [0, 0, 0, 1]:

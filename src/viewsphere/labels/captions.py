@@ -54,16 +54,16 @@ if TYPE_CHECKING:
     from viewsphere.labels.shared.context import LabelContext
 
 MOST = 100
-"""Sentences about one picture."""
+"""Maximum number of sentences about one picture."""
 
 CLEAR, CLOUDY = 0.2, 0.6
-"""Clouds below which the sky is clear, and from which on it is overcast."""
+"""Cloud cover below which the sky is clear, and from which it is overcast."""
 
 LOW_DEG = 20.0
 """The sun's elevation below which it is low."""
 
 SEEN_STUFF = 0.05
-"""Share of the pixels from which on stuff is told of."""
+"""Minimum share of the pixels for captions to mention stuff."""
 
 FOGGY = 300.0
 """Metres of visibility below which rain and snow fall through fog."""
@@ -114,22 +114,22 @@ class Seen:
 
     @cached_property
     def company(self) -> Company:
-        """The objects together."""
+        """All objects, with the relations between them."""
         return Company(self.told)
 
     @cached_property
     def groups(self) -> Sequence[tuple[str, int]]:
-        """Nouns and how many there are of each, in the order of lists."""
+        """Nouns and the number of objects for each, in the order of lists."""
         return grouped(self.told)
 
     @property
     def list(self) -> str:
-        """The visible objects with their numbers: three chairs and a car."""
+        """The list of visible objects in words, with counts: three chairs and a car."""
         return listing(self.groups, self.plurals)
 
 
 def compute(context: LabelContext, objects: Sequence[ObjectAnnotation]) -> Mapping[str, Any]:
-    """The sentences of a picture; of a LiDAR's none."""
+    """The sentences of a picture; none for a LiDAR's."""
     options, scenery, names = context.options_of("captions", Captions), context.get(ShotAppearance()), context.get(Randomness())
     if scenery is None or names is None:
         raise ValueError("captions: expected a sample of a shot, found none")
@@ -164,7 +164,7 @@ def _weather(scenery: Scenery) -> tuple[str, bool]:
 
 
 def _air(scenery: Scenery) -> tuple[str, ...]:
-    """Words for fog, rain and snow; mist that follows from rain alone is left out."""
+    """Words for fog, rain and snow, without mist that only results from rain."""
     scene = scenery.shot.scene
     falls = [word for word, what in (("raining", scene.rain), ("snowing", scene.snow)) if what is not None]
     is_foggy = scene.fog is not None and (not falls or scene.fog.visibility < FOGGY)
@@ -172,14 +172,14 @@ def _air(scenery: Scenery) -> tuple[str, ...]:
 
 
 def _surroundings(context: LabelContext) -> str:
-    """A list of the stuff that is seen."""
+    """The list of visible stuff, in words."""
     classes = context.per_triangle(context.geometry.triangle_class, SKY)
     pixels = np.bincount(classes.ravel(), minlength=len(STUFF_IDS) + 1)
     return listed([words for name, words in SURROUNDINGS.items() if pixels[STUFF_IDS[name]] >= SEEN_STUFF * classes.size])
 
 
 def _sentences(seen: Seen, most: int, rng: Rng) -> list[Caption]:
-    """A sentence of counts, and others, whose forms take turns."""
+    """A sentence of counts, and other sentences, whose forms alternate."""
     ids = tuple(o.id for o in seen.told)
     if not ids:
         return [Caption(NOTHING, "count")]
@@ -196,7 +196,7 @@ def _sentences(seen: Seen, most: int, rng: Rng) -> list[Caption]:
 
 
 def _of_one(form: str) -> Callable[[Seen, Rng], Sentences]:
-    """The sentences of a form that say something of one object."""
+    """The function that makes a form's sentences about single objects."""
 
     def sentences(seen: Seen, rng: Rng) -> Sentences:
         for i in rng.permutation(len(seen.told)).tolist():
@@ -208,13 +208,13 @@ def _of_one(form: str) -> Callable[[Seen, Rng], Sentences]:
 
 
 def _phrase(seen: Seen, o: ObjectAnnotation, rng: Rng) -> tuple[str, Words]:
-    """One of an object's noun phrases, by chance, and its words for looks."""
+    """A random noun phrase of an object, and its words for appearance."""
     known = list(phrases(o, seen.words[o.id]))
     return known[int(rng.integers(len(known)))]
 
 
 def _relations(seen: Seen, rng: Rng) -> Sentences:
-    """For each two objects, in both orders, one of the relations that hold."""
+    """For each pair of objects, in both orders, one of the relations that hold."""
     count = len(seen.told)
     for i, j in (divmod(pair, count) for pair in rng.permutation(count * count).tolist()):
         known = [name for name in RELATIONS if seen.company.relations[name][i, j]]
@@ -255,8 +255,8 @@ def _by_templates(seen: Seen, options: Captions, rng: Rng) -> list[Caption]:
 
 
 def _filled(template: str, seen: Seen, rng: Rng) -> Sentences:
-    """A template filled in with each object for which all its fields have a word, in an order of chance; without fields of
-    objects, once.
+    """A template, filled in for each object that has a word for all of its fields, in random order. A template without fields
+    of objects is filled in once.
     """
     fields = fields_of(template)
     shared = Filled(fields, _of_picture(seen))
@@ -282,7 +282,7 @@ def _of_picture(seen: Seen) -> dict[str, str]:
 
 
 def _of_object(seen: Seen, i: int, rng: Rng, is_related: bool) -> tuple[dict[str, str], tuple[int, ...]]:
-    """The words of an object's fields, and the ids of what they are of."""
+    """The words for an object's fields, and the ids of the objects that they describe."""
     o = seen.told[i]
     noun, (color, material) = noun_of(o.category), seen.words[o.id]
     *_, (whole, _) = phrases(o, (color, material))
@@ -308,8 +308,8 @@ def _of_object(seen: Seen, i: int, rng: Rng, is_related: bool) -> tuple[dict[str
 
 
 def prove(sample: Sample, models: Models) -> Iterator[str]:
-    """Sentences are different and name visible objects; what they say of these holds by the sample's other labels, of colours
-    and materials where it has `looks`.
+    """Sentences differ and name visible objects; their statements agree with the sample's other labels. Colours and materials
+    are checked if the sample has `looks`.
     """
     visible = {o.id: o for o in sample.objects if o.box2d is not None}
     options = Captions.model_validate(sample.options.get("captions", {}))

@@ -1,4 +1,4 @@
-"""categories: the category of the object seen."""
+"""categories: the category of the seen object."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from viewsphere.model.sample import Sample
 
 
 def prove(sample: Sample, models: Models) -> Iterator[str]:
-    """The map holds the categories of the objects that the instance map shows."""
+    """The map contains the categories of the objects in the instance map."""
     instances, categories = channel_of(sample, "instances"), channel_of(sample, "categories")
     if instances is None or categories is None:
         return

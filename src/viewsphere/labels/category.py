@@ -13,13 +13,13 @@ from viewsphere.model.sample import Sample
 
 
 def of(placement: Placement) -> Mapping[str, Any]:
-    """The category, as the model's entry in the recipe says."""
+    """The category from the model's entry in the recipe."""
     spec = placement.spec
     return {"category": spec.category, "supercategory": spec.supercategory, "category_id": spec.category_id}
 
 
 def prove(sample: Sample, models: Models) -> Iterator[str]:
-    """Objects are of their models' categories."""
+    """Objects have the categories of their models."""
     for o in rendered(sample):
         facts = models.get(o.key)
         if facts is not None and (facts.category, facts.category_id) != (o.category, o.category_id):

@@ -19,14 +19,14 @@ if TYPE_CHECKING:
 
 
 def restore(kept: None, placement: Placement, o: ObjectAnnotation) -> Mapping[str, Any]:
-    """Both, of the mask's pixel corners."""
+    """Outlines and hull, from the corners of the mask's pixels."""
     mask = o.mask
     hull = convex_hull(mask_outline(mask)) if mask.any() else np.empty((0, 2))
     return {"contour": tuple(np.array(ring).reshape(-1, 2) for ring in o.polygons), "hull": hull}
 
 
 def prove(sample: Sample, models: Models) -> Iterator[str]:
-    """Outlines enclose as much as the mask has pixels; the hull is convex, encloses no less, and reaches to the box's sides."""
+    """Outlines enclose the area of the mask; the hull is convex, encloses no less, and reaches the box's sides."""
     for o in rendered(sample):
         enclosed = sum(_area(ring) for ring in o.contour)
         if abs(enclosed - o.area) > 1e-6:

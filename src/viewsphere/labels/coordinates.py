@@ -1,4 +1,4 @@
-"""coordinates: where on its object the seen point is."""
+"""coordinates: the position of the seen point on its object."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ if TYPE_CHECKING:
     from viewsphere.labels.shared.context import LabelContext
 
 TOLERANCE = 1e-5
-"""Share of an object's size by which float32 coordinates may lie outside of its box."""
+"""Share of an object's size by which float32 coordinates may be outside its box."""
 
 
 def compute(context: LabelContext) -> NDArray[np.float32]:
-    """The seen point in its object's axes, (H, W, 3) metres; NaN on scenery, ground and where nothing is seen."""
+    """The seen point in its object's axes, (H, W, 3) metres; NaN on scenery, on ground, and where nothing is seen."""
     from viewsphere.truth.raster import kernels_channels as kernels
 
     out, g = context.empty(np.float32, 3), context.geometry
@@ -45,8 +45,8 @@ def prove(sample: Sample, models: Models) -> Iterator[str]:
 
 
 def picture(sample: Sample) -> Picture:
-    """The points as a picture (H, W, 3) uint8: from one side of their object's box to the other, red goes with x, green with y,
-    blue with z; black where there are none.
+    """The points as a picture (H, W, 3) uint8. From one side of their object's box to the other, red grows with x, green with y
+    and blue with z. Pixels without a point are black.
     """
     points = sample.channels["coordinates"]
     out = np.zeros(points.shape, np.uint8)

@@ -27,7 +27,7 @@ def along_axis(context: LabelContext) -> NDArray[np.float32]:
 
 
 def prove_depth(sample: Sample, models: Models) -> Iterator[str]:
-    """Depth is metres, and finite wherever an object is seen."""
+    """Depth is in metres, and finite wherever an object is seen."""
     depth, instances = channel_of(sample, "depth"), channel_of(sample, "instances")
     if depth is None:
         return
@@ -40,7 +40,7 @@ def prove_depth(sample: Sample, models: Models) -> Iterator[str]:
 def along_ray(context: LabelContext) -> NDArray[np.float32]:
     """Distance from the camera's centre to the seen point, (H, W) metres, infinite where nothing is seen.
 
-    It is the length of the pixel's ray times 1/s of `truth.raster.visibility`: never negative, behind a fisheye neither.
+    It is the length of the pixel's ray times 1/s of `truth.raster.visibility`. It is never negative, even behind a fisheye.
     """
     length = np.linalg.norm(pixel_rays(context.camera.intrinsics), axis=-1)
     out = np.full(length.shape, np.inf, np.float32)
@@ -50,7 +50,7 @@ def along_ray(context: LabelContext) -> NDArray[np.float32]:
 
 
 def prove_depth_ray(sample: Sample, models: Models) -> Iterator[str]:
-    """Distances are metres above 0, and finite where depth is. Depth may be kept in steps, so the numbers are not compared."""
+    """Distances are above 0, and finite where depth is. The values are not compared, because depth may be stored in steps."""
     distance, depth = channel_of(sample, "depth_ray"), channel_of(sample, "depth")
     if distance is None:
         return

@@ -1,4 +1,4 @@
-"""depth_order: which of two objects that overlap in the picture lies before the other."""
+"""depth_order: which of two overlapping objects in the picture is in front of the other."""
 
 from __future__ import annotations
 
@@ -25,8 +25,8 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Overlap:
-    """Another object whose pixels, hidden ones included, are partly the same: its id, their number in the image, and the share
-    of them at which the object itself is the nearer of the two.
+    """Another object that shares pixels with the object, hidden pixels included. The fields are its id, the number of shared
+    pixels in the image, and the share of them at which the object itself is nearer.
     """
 
     id: int
@@ -38,7 +38,7 @@ def compute(context: LabelContext, i: int) -> Mapping[str, Any]:
     """The objects that overlap with the one of id i + 1, in the order of their ids.
 
     The pairwise orders of amodal data sets: Y. Zhu et al., https://arxiv.org/abs/1509.01329; H. Lee and J. Park, InstaOrder,
-    https://arxiv.org/abs/2111.14562, which tells, too, pairs where each is nearer somewhere.
+    https://arxiv.org/abs/2111.14562, which also has pairs where each object is nearer somewhere.
     """
     others = [j for j, place in enumerate(context.placements) if place and j != i]
     if not others or context.is_unobstructed(i):
@@ -69,7 +69,7 @@ def restore(kept: Any, placement: Placement, o: ObjectAnnotation) -> Mapping[str
 
 
 def prove(sample: Sample, models: Models) -> Iterator[str]:
-    """Overlaps are mutual, as large as those of the amodal masks where these are kept, and both shares together at most 1."""
+    """Overlaps are mutual and match the amodal masks where these are stored; the two shares add up to at most 1."""
     by_id = {o.id: o for o in rendered(sample)}
     for o in by_id.values():
         for one in o.overlaps:
@@ -96,7 +96,7 @@ def _mask(o: ObjectAnnotation) -> Any:
 
 
 def draw(pen: ImageDraw, sample: Sample, scale: float) -> None:
-    """An arrow from each object to those that overlap with it and lie mostly behind it."""
+    """An arrow from each object to the overlapping objects that are mostly behind it."""
     by_id = {o.id: o for o in sample.objects}
     for o in sample.objects:
         for one in o.overlaps:
@@ -106,7 +106,7 @@ def draw(pen: ImageDraw, sample: Sample, scale: float) -> None:
 
 
 MOSTLY = 0.5
-"""Share of the common pixels from which on an object is drawn as the nearer one."""
+"""Minimum share of the common pixels for an object to be drawn as the nearer one."""
 
 
 LABEL = ObjectLabel(

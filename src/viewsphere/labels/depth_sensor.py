@@ -27,7 +27,7 @@ Draw = Callable[[str], Float]
 """Draws numbers (H, W) of the standard normal distribution for a purpose."""
 
 STEPS = 35130.0
-"""Centimetres times steps of a Kinect's disparity: a step is an eighth of a pixel."""
+"""Depth in centimetres times disparity in steps, for a Kinect: a step is an eighth of a pixel."""
 
 
 class Options(Frozen):
@@ -62,7 +62,7 @@ def compute(context: LabelContext) -> NDArray[np.float32]:
 
     C. Nguyen, S. Izadi, D. Lovell, Modeling Kinect Sensor Noise for Improved 3D Reconstruction and Tracking, 3DIMPVT 2012:
     axial and lateral noise. J. Barron, J. Malik, Intrinsic Scene Properties from a Single RGB-D Image, CVPR 2013: steps. A
-    point that the projector, or the second camera, does not see because something in its row lies before it is a hole.
+    point is a hole if something in its row hides it from the projector or the second camera.
     """
     options, names = context.options_of("depth_sensor", Options), context.get(Randomness())
     if names is None:
@@ -84,8 +84,8 @@ def compute(context: LabelContext) -> NDArray[np.float32]:
 
 
 def _seen(context: LabelContext) -> tuple[Float, Float]:
-    """Depth (H, W), infinite where nothing is before the camera, and the angle (H, W) from the triangle's normal to the ray, a
-    right one where the lens has no ray.
+    """Depth (H, W), infinite where nothing is in front of the camera, and the angle (H, W) from the triangle's normal to the
+    ray, which is 90 degrees where the lens has no ray.
     """
     from viewsphere.truth.raster import kernels_channels as kernels
 
@@ -94,14 +94,14 @@ def _seen(context: LabelContext) -> tuple[Float, Float]:
     told = (context.geometry.triangle_normals, context.rays, context.camera_from_ray, context.camera.R)
     kernels.normals_geometric(context.visibility.triangle, *told, normals)
     cosine = np.abs((normals * rays).sum(axis=-1)) / np.sqrt((rays * rays).sum(axis=-1))
-    near = context.visibility.inverse_depth.astype(np.float64)  # as all frames have it, those that are compared with none, too
+    near = context.visibility.inverse_depth.astype(np.float64)  # the rounded value, which every frame has
     with np.errstate(divide="ignore", invalid="ignore"):
         depth = np.where((near > 0) & (rays[..., 2] > 0), rays[..., 2] / near, np.inf)
     return depth, np.arccos(np.clip(np.nan_to_num(cosine), 0.0, 1.0))
 
 
 def _shadow(depth: Float, reach: float) -> NDArray[np.bool_]:
-    """Pixels that a second eye at the baseline along +x does not see: in its picture something to their right lies as far left.
+    """Pixels hidden from a second eye at the baseline along +x: in its picture, something to their right covers them.
 
     `reach` is baseline times focal length, metres times pixels.
     """
@@ -113,7 +113,7 @@ def _shadow(depth: Float, reach: float) -> NDArray[np.bool_]:
 
 
 def _kinect(depth: Float, angle: Float, focal: float, options: Options, draw: Draw) -> Float:
-    """Depth from a place beside, by lateral noise, with axial noise, in steps of the disparity."""
+    """Depth, read from a neighbouring place (lateral noise), with axial noise, in steps of the disparity."""
     flat = np.minimum(angle, math.radians(89.0))
     lean = flat / (math.pi / 2 - flat)
     lateral = options.noise * (0.8 + 0.035 * lean)
@@ -133,7 +133,7 @@ def _kinect(depth: Float, angle: Float, focal: float, options: Options, draw: Dr
 
 
 def _stereo(depth: Float, angle: Float, focal: float, options: Options, draw: Draw) -> Float:
-    """Depth of a disparity that is matched with noise, in steps of a part of a pixel."""
+    """Depth from a disparity with matching noise, in steps of a fraction of a pixel."""
     step = 0.125 if options.step is None else options.step
     disparity = focal * options.baseline / depth + options.noise * draw("disparity")
     matched = np.rint(disparity / step) * step if step else disparity
@@ -142,7 +142,7 @@ def _stereo(depth: Float, angle: Float, focal: float, options: Options, draw: Dr
 
 
 def _quantile(share: float) -> float:
-    """The number below which a standard normal number lies with this chance."""
+    """The standard normal quantile of this probability."""
     return NormalDist().inv_cdf(share)
 
 

@@ -1,4 +1,4 @@
-"""disparity: how far apart a stereo pair's pictures show a point."""
+"""disparity: the distance between a point's positions in the two pictures of a stereo pair."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ if TYPE_CHECKING:
 
 
 def compute(context: LabelContext) -> NDArray[np.float32]:
-    """fx baseline / z, (H, W) pixels, positive in both pictures of the pair; 0 of the sky.
+    """fx baseline / z, (H, W) pixels, positive in both pictures of the pair; 0 for the sky.
 
-    The other picture is that of the first of the rig's sensors that is rectified with the own one. NaN without such a sensor,
+    The other picture is from the first sensor of the rig that is rectified with the picture's own. NaN without such a sensor,
     and where a flat picture is seen.
     """
     out, baseline, own = context.empty(np.float32), context.baseline, context.own_view
@@ -33,7 +33,7 @@ def compute(context: LabelContext) -> NDArray[np.float32]:
 
 
 def prove(sample: Sample, models: Models) -> Iterator[str]:
-    """Disparity is never negative, and 0 of what is infinitely far."""
+    """Disparity is never negative, and 0 at infinite depth."""
     disparity, depth = channel_of(sample, "disparity"), channel_of(sample, "depth")
     if disparity is None:
         return
@@ -44,7 +44,7 @@ def prove(sample: Sample, models: Models) -> Iterator[str]:
 
 
 def extent(disparity: NDArray[np.float32]) -> Extent:
-    """The disparity that 98 % of the pixels exceed, and the greatest."""
+    """The disparity that 98 % of the pixels exceed, and the greatest disparity."""
     known = disparity[np.isfinite(disparity)]
     return (0.0, 0.0) if not known.size else (float(np.percentile(known, 2)), float(known.max()))
 

@@ -1,4 +1,4 @@
-"""disparity_change: by how much the seen point's disparity changes until the next instant."""
+"""disparity_change: the change of the seen point's disparity until the next instant."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ if TYPE_CHECKING:
 
 
 def compute(context: LabelContext) -> NDArray[np.float32]:
-    """The same point's disparity an instant later less that now, (H, W) pixels; 0 of the sky.
+    """The same point's disparity an instant later minus its disparity now, (H, W) pixels; 0 for the sky.
 
-    NaN where the point is behind the camera then, where it is gone, and without a rectified sensor or a later instant.
+    NaN where the point is then behind the camera or gone, and without a rectified sensor or a later instant.
     """
     out, baseline, match = context.empty(np.float32), context.baseline, context.match(Next())
     if baseline is None or match is None:
@@ -33,21 +33,21 @@ def compute(context: LabelContext) -> NDArray[np.float32]:
 
 
 def prove(sample: Sample, models: Models) -> Iterator[str]:
-    """Disparity is not negative afterwards, either."""
+    """Disparity is not negative after the change, either."""
     change, now = channel_of(sample, "disparity_change"), channel_of(sample, "disparity")
     if change is not None and now is not None and (now + change < -1e-3 * np.maximum(np.abs(change), 1)).any():
         yield "expected disparity of at least 0 afterwards; found less"
 
 
 def extent(change: NDArray[np.float32]) -> Extent:
-    """The change that 99 % of the pixels do not exceed, either way."""
+    """The magnitude of change that 99 % of the pixels do not exceed, with both signs."""
     known = np.abs(change[np.isfinite(change)])
     most = float(np.percentile(known, 99)) if known.size else 0.0
     return -most, most
 
 
 def picture(change: NDArray[np.float32], within: Extent | None = None) -> Picture:
-    """A change as a picture (H, W, 3): nearer is red, farther is blue, none white, NaN black."""
+    """A change as a picture (H, W, 3): nearer is red, farther is blue, no change is white, NaN is black."""
     known = np.isfinite(change)
     most = (within or extent(change))[1]
     share = np.clip(np.where(known, change, 0) / max(most, 1e-9), -1, 1)

@@ -1,4 +1,4 @@
-"""ego_motion: how the camera moves between a picture and those before and after it."""
+"""ego_motion: the camera's motion from the previous picture and to the next one."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def relative(to: Camera, of: Camera) -> Any:
 
 
 def prove(sample: Sample, models: Models) -> Iterator[str]:
-    """Both are rigid, and at least one is there: a sequence has two instants or more."""
+    """Both poses are rigid, and at least one exists: a sequence has two instants or more."""
     known = [pose for pose in (sample.camera_from_previous, sample.camera_from_next) if pose is not None]
     for pose in known:
         turn = pose[:3, :3]
@@ -47,7 +47,7 @@ def prove(sample: Sample, models: Models) -> Iterator[str]:
 
 
 def draw(pen: ImageDraw, sample: Sample, scale: float) -> None:
-    """A small map in the lower left corner: the camera now, before and after, and how far it moves and turns until then."""
+    """A small map in the lower left corner: the camera now, before and after, with its distances and turns."""
     before, after = sample.camera_from_previous, sample.camera_from_next
     moved = after if after is not None else before
     words = "" if moved is None else f"{np.linalg.norm(moved[:3, 3]):.3g} m {turned_deg(moved):.3g}\u00b0"

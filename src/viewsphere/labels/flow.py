@@ -1,4 +1,4 @@
-"""flow and flow_backward: optical flow, where the seen point is one instant later or earlier."""
+"""flow and flow_backward: optical flow, the motion of the seen point to the next or previous instant."""
 
 from __future__ import annotations
 
@@ -19,20 +19,20 @@ if TYPE_CHECKING:
     from viewsphere.labels.shared.context import LabelContext
 
 EDGE = 1e-3
-"""Pixels from the picture's border within which the rounding of stored flow decides whether it leads outside."""
+"""Pixels from the picture's border within which rounding of stored flow decides whether the flow leads outside."""
 
 
 def flow(context: LabelContext, to: Next | Previous) -> NDArray[np.float32]:
     """Return the motion of each seen point to another instant, (H, W, 2) pixels, right and down.
 
-    NaN where the point has no pixel then: behind the camera, on a thing that is absent then, on a flat picture.
+    NaN where the point has no pixel at that instant: behind the camera, on an absent thing, on a flat picture.
     """
     match = context.match(to)
     return np.full((*context.visibility.triangle.shape, 2), np.nan, np.float32) if match is None else match.flow
 
 
 def _prove(sample: Sample, name: str) -> Iterator[str]:
-    """Flow is there wherever its point has a pixel, and leads outside where the state says so."""
+    """Flow exists wherever its point has a pixel, and leads outside where the state is outside."""
     state = f"{name}_state"
     vectors, states = channel_of(sample, name), channel_of(sample, state)
     if vectors is None:
@@ -50,7 +50,7 @@ def _against(vectors: Array, states: Array, state: str) -> Iterator[str]:
         yield f"expected vectors where {state} is 0, 1 or 2, NaN elsewhere; found others at {wrong.sum()} pixels"
     height, width = states.shape
     there = pixel_centers(states.shape) + vectors
-    inside = np.minimum(there, (width, height) - there).min(axis=-1)  # how far inside of the picture
+    inside = np.minimum(there, (width, height) - there).min(axis=-1)  # distance from the picture's border
     wrong = has_pixel & (np.abs(inside) > EDGE) & ((inside < 0) != (states == OUTSIDE))
     if wrong.any():
         yield f"expected {state} 2 where the vectors lead outside; found others at {wrong.sum()} pixels"

@@ -13,7 +13,7 @@ from viewsphere.model.sample import Sample
 
 
 def prove(sample: Sample, models: Models) -> Iterator[str]:
-    """The map holds only ids of objects of the sample."""
+    """The map contains only ids of the sample's objects."""
     instances = channel_of(sample, "instances")
     if instances is None or not instances.size:
         return

@@ -1,4 +1,4 @@
-"""keypoints: where the named points of an object's model are, and whether they are seen."""
+"""keypoints: the positions of the named points of an object's model, and whether they are seen."""
 
 from __future__ import annotations
 
@@ -31,10 +31,10 @@ Float = NDArray[np.float64]
 
 TOLERANCE = 1e-9
 EDGE = 1e-6
-"""Pixels within which rounding decides whether a point lies in the image."""
+"""Pixels within which rounding decides whether a point is in the image."""
 
 NEAREST = 0.5
-"""Share of a point's distance by which surface may lie before it at most."""
+"""Maximum share of a point's distance by which surface may be in front of it."""
 
 
 class Options(Frozen):
@@ -56,9 +56,9 @@ def compute(context: LabelContext, i: int) -> Mapping[str, Any]:
 
 
 def _states(context: LabelContext) -> dict[int, tuple[int, ...]]:
-    """The states of all objects' points by the objects' positions: the triangles are drawn once for all of them.
+    """The states of all objects' points by the objects' positions. The triangles are drawn once for all of them.
 
-    A point is tested at the place on its ray that lies nearer to the camera by the slack.
+    A point is tested at a place on its ray that is nearer to the camera by the slack.
     """
     view, slack = context.get(OwnView()), context.options_of("keypoints", Options).depth_slack
     if view is None:
@@ -102,7 +102,7 @@ def _fields(placement: Placement, states: Any) -> Mapping[str, Any]:
 
 
 def restore(kept: Any, placement: Placement, o: ObjectAnnotation) -> Mapping[str, Any]:
-    """Return every field, computed from the states, which are kept."""
+    """Return every field, computed from the stored states."""
     found = _fields(placement, kept or ())
     if len(found["keypoint_states"]) != len(found["keypoints"]):
         raise ValueError(f"{len(found['keypoints'])} states, one a named point of the model")

@@ -1,4 +1,4 @@
-"""occlusion_level and truncation_level: how much of an object is hidden or outside of the image, in KITTI's grades."""
+"""occlusion_level and truncation_level: the hidden share of an object and the share outside the image, in KITTI's grades."""
 
 from __future__ import annotations
 
@@ -16,21 +16,22 @@ if TYPE_CHECKING:
     from PIL.ImageDraw import ImageDraw
 
 PARTLY, LARGELY_HIDDEN = 0.05, 0.5
-"""Hidden shares of an object's pixels in the image, above which it is partly, and largely occluded. KITTI's people judged by
+"""Hidden shares of an object's pixels in the image above which it is partly or largely occluded. KITTI's annotators judged by
 eye, without numbers; https://github.com/bostondiditeam/kitti/blob/master/resources/devkit_object/readme.txt has the grades.
 """
 
 TRUNCATED, LARGELY_OUTSIDE = 0.15, 0.5
-"""Shares outside of the image above which an object is truncated, and largely so: the most that the benchmark's easy and hard
-objects may have, https://www.cvlibs.net/datasets/kitti/eval_object.php.
+"""Shares outside the image above which an object is truncated or largely truncated. They are the limits for the benchmark's
+easy and hard objects, https://www.cvlibs.net/datasets/kitti/eval_object.php.
 """
 
 UNKNOWN = 3
-"""Grade of an object that lies outside of the image."""
+"""Grade of an object outside the image."""
 
 
 def occlusion(kept: None, placement: Placement, o: ObjectAnnotation) -> Mapping[str, Any]:
-    """The grade that visibility and truncation mean: of the pixels in the image, those outside of it are KITTI's truncation."""
+    """The grade for visibility and truncation. It counts only pixels in the image; pixels outside count as KITTI's truncation.
+    """
     if o.truncation >= 1:
         return {"occlusion_level": UNKNOWN}
     hidden = 1 - o.visibility / (1 - o.truncation)
@@ -46,7 +47,7 @@ def prove_occlusion(sample: Sample, models: Models) -> Iterator[str]:
 
 
 def truncation(kept: None, placement: Placement, o: ObjectAnnotation) -> Mapping[str, Any]:
-    """The grade that the truncation means."""
+    """The grade for the truncation."""
     return {"truncation_level": int(o.truncation > TRUNCATED) + int(o.truncation > LARGELY_OUTSIDE)}
 
 
@@ -67,7 +68,7 @@ def _label(
     prove: Proof,
     key: str,
 ) -> ObjectLabel:
-    """A label of a grade, drawn at each object's box."""
+    """A label with a grade, drawn at each object's box."""
 
     def draw(pen: ImageDraw, sample: Sample, scale: float) -> None:
         for o in sample.objects:

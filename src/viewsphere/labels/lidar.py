@@ -31,8 +31,8 @@ ROUNDED = 1e-6
 
 
 def compute(context: LabelContext) -> NDArray[np.void]:
-    """One row a point that returns, (N,) of `viewsphere.model.sensors.lidar.POINT`, ring by ring. Raises ValueError if the
-    sensor is no LiDAR.
+    """One row for each returned point, (N,) of `viewsphere.model.sensors.lidar.POINT`, ring by ring. Raises ValueError if the
+    sensor is not a LiDAR.
     """
     scanner, names = context.get(LidarScan()), context.get(Randomness())
     lidar = None if scanner is None else scanner.sensor.lidar
@@ -71,13 +71,13 @@ def _intensity(lidar: Lidar, distance: Float, reflected: Float) -> Float:
 
 
 Draw = Callable[[str, Callable[..., Float]], Float]
-"""Draws a number for each of the points, for a purpose and by a method of numpy's generators."""
+"""Draws a random number for each point, given a purpose and a method of numpy's generators."""
 
 
 def _drawn(
     seed: int, names: Sequence[str], size: tuple[int, ...], rays: Rays, purpose: str, method: Callable[..., Float]
 ) -> Float:
-    """A number for each of some rays (ring, column) of a scan: every ray has its own, whether others are asked for or not."""
+    """A random number for each of the given rays (ring, column) of a scan. A ray's number does not depend on the other rays."""
     return method(generator(seed, *names, purpose), size)[rays]
 
 
@@ -92,7 +92,7 @@ def _returns(lidar: Lidar, distance: Float, intensity: Float, draw: Draw) -> NDA
 
 
 def in_lidar_axes(vectors: Float) -> Float:
-    """Vectors (..., 3) of camera axes (right, down, ahead) in a LiDAR's: ahead, left, up."""
+    """Vectors (..., 3) in camera axes (right, down, ahead), converted to a LiDAR's axes (ahead, left, up)."""
     return np.stack([vectors[..., 2], -vectors[..., 0], -vectors[..., 1]], axis=-1)
 
 

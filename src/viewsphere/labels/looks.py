@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 
 def compute(context: LabelContext, i: int) -> Mapping[str, Any]:
-    """The words that hold for most of the model's surface, as the shot paints it."""
+    """The words for most of the model's surface, with the shot's materials."""
     color, material = words_of(context)[i + 1]
     return {"color": color or None, "material": material or None}
 
@@ -34,7 +34,7 @@ def restore(kept: Any, placement: Placement, o: ObjectAnnotation) -> Mapping[str
 
 
 def prove(sample: Sample, models: Models) -> Iterator[str]:
-    """Words are printable and short; a model without known looks has none."""
+    """Words are printable and short; a model of unknown appearance has none."""
     for o in rendered(sample):
         known = models.get(o.key)
         for word in filter(None, (o.color, o.material)):
@@ -45,7 +45,7 @@ def prove(sample: Sample, models: Models) -> Iterator[str]:
 
 
 def draw(pen: ImageDraw, sample: Sample, scale: float) -> None:
-    """The words at every visible object."""
+    """The words, written at every visible object."""
     for o in sample.objects:
         if o.box2d and (o.color or o.material):
             note(pen, o, scale, " ".join(filter(None, (o.color, o.material))), color_of(o.id))

@@ -31,18 +31,18 @@ def compute(context: LabelContext, i: int) -> Mapping[str, Any]:
 
 @lru_cache(maxsize=16)
 def _nothing(height: int, width: int) -> Rle:
-    """The mask of what is not seen: of most things of a street."""
+    """The mask of an invisible object, cached because most things in a street are invisible."""
     return Rle(height, width, rle_of_part(height, width, np.zeros((0, 0), np.bool_), 0, 0))
 
 
 def restore(counts: str, placement: Placement, o: ObjectAnnotation) -> Mapping[str, Any]:
-    """The fields, from the run-length code that is kept."""
+    """The fields, from the stored run-length code."""
     height, width = placement.camera.height, placement.camera.width
     return {"rle": Rle(height, width, counts), "area": rle_area(height, width, counts)}
 
 
 def prove(sample: Sample, models: Models) -> Iterator[str]:
-    """Run lengths and polygons are the instance map's pixels, and their number is the area."""
+    """Run lengths and polygons match the instance map's pixels, and the number of these pixels is the area."""
     from pycocotools import mask as coco
 
     instances = channel_of(sample, "instances")
@@ -57,7 +57,7 @@ def prove(sample: Sample, models: Models) -> Iterator[str]:
         if instances is not None and not np.array_equal(mask, instances == o.id):
             yield f"object {o.id}: run lengths differ from the instance map at {(mask != (instances == o.id)).sum()} pixels"
         if o.source is not None and not mask.any():
-            continue  # an imported object may have a box alone
+            continue  # an imported object may have only a box
         if o.area != mask.sum():
             yield f"object {o.id}: expected area {mask.sum()}, found {o.area}"
         polygons: Any = mask_polygons(mask)
@@ -68,7 +68,7 @@ def prove(sample: Sample, models: Models) -> Iterator[str]:
 
 
 def _foreign(o: ObjectAnnotation, size: tuple[int, int]) -> Iterator[str]:
-    """The run lengths of an imported object's mask fill the picture and sum to its area; an object may have a box alone.
+    """The run lengths of an imported object's mask fill the picture and sum to its area; an object may have only a box.
 
     No pixel is drawn, because a few characters can encode the largest picture.
     """

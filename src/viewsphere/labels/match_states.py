@@ -1,4 +1,4 @@
-"""flow_state, flow_backward_state and disparity_state: whether another picture shows the seen point, too."""
+"""flow_state, flow_backward_state and disparity_state: whether another picture also shows the seen point."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def drawing(channel: str) -> Drawing:
 
 
 def picture(states: NDArray[np.uint8]) -> Picture:
-    """States as a picture (H, W, 3): visible light, occluded red, outside blue, behind violet, invalid black."""
+    """States as a picture (H, W, 3): visible is light, occluded red, outside blue, behind violet, invalid black."""
     return COLORS[np.minimum(states, INVALID)]
 
 

@@ -1,4 +1,4 @@
-"""model: which model an object is."""
+"""model: the model of an object."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def of(placement: Placement) -> Mapping[str, Any]:
 
 
 def prove(sample: Sample, models: Models) -> Iterator[str]:
-    """The object's model is one of the data set's."""
+    """The object's model is in the data set."""
     for o in rendered(sample):
         facts = models.get(o.key)
         if facts is None:

@@ -1,4 +1,4 @@
-"""parts, body_parts and materials: the part, the part of the body, and the material of its model that is seen."""
+"""parts, body_parts and materials: the part, the body part and the material of the model at the seen point."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from viewsphere.model.sample import Sample
 
 
 def prove_parts(sample: Sample, models: Models) -> Iterator[str]:
-    """Objects have parts, the background has no part."""
+    """Objects have parts; the background has none."""
     parts, instances = channel_of(sample, "parts"), channel_of(sample, "instances")
     if parts is not None and instances is not None and ((parts > 0) != (instances > 0)).any():
         yield f"expected a part where an object is seen, none elsewhere; found {((parts > 0) != (instances > 0)).sum()} others"
 
 
 def prove_body_parts(sample: Sample, models: Models) -> Iterator[str]:
-    """Only objects have parts, of their own models, and a triangle has one."""
+    """Only objects have parts, these exist in their models, and a triangle has one part."""
     found, instances = channel_of(sample, "body_parts"), channel_of(sample, "instances")
     if found is None or instances is None:
         return
@@ -39,7 +39,7 @@ def prove_body_parts(sample: Sample, models: Models) -> Iterator[str]:
 
 
 def prove_materials(sample: Sample, models: Models) -> Iterator[str]:
-    """Objects have materials of their models, the background has none, and a triangle has one."""
+    """Objects have materials of their models, the background has none, and a triangle has one material."""
     materials, instances = channel_of(sample, "materials"), channel_of(sample, "instances")
     if materials is None or instances is None:
         return
@@ -57,7 +57,7 @@ def prove_materials(sample: Sample, models: Models) -> Iterator[str]:
 
 
 def _label(name: str, meaning: str, unit: str, table: str, prove: Proof) -> ChannelLabel:
-    """A channel of the numbers that a table of the geometry gives triangles."""
+    """A channel of the triangles' numbers in a table of the geometry."""
     return ChannelLabel(
         name=name,
         meaning=meaning,

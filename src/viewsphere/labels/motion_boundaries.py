@@ -1,4 +1,4 @@
-"""motion_boundaries: pixels beside which something else moves otherwise."""
+"""motion_boundaries: pixels next to something that moves differently."""
 
 from __future__ import annotations
 
@@ -18,21 +18,21 @@ if TYPE_CHECKING:
 
 APART = 1.5
 """Pixels by which flows differ at a boundary (Mayer et al. 2016, "A Large Dataset to Train Convolutional Networks for
-Disparity, Optical Flow, and Scene Flow Estimation"; that its boundaries are of 10 pixels at least is not asked for here).
+Disparity, Optical Flow, and Scene Flow Estimation"; the paper's minimum of 10 pixels for a boundary does not apply here).
 """
 
 COLOR = (255, 40, 170)
-"""That boundaries are drawn in, which few pictures have."""
+"""The colour of drawn boundaries, which few pictures contain."""
 
 JOINED = 0.05
-"""Greatest relative difference of the 1/s of neighbouring pixels of one thing that are one surface."""
+"""Maximum relative difference in 1/s for neighbouring pixels of one thing to count as one surface."""
 
 
 def compute(context: LabelContext) -> NDArray[np.uint8]:
     """1 on both sides of a boundary, else 0, (H, W).
 
-    A boundary is between two pixels, one beside or below the other, of different things, or of surfaces that do not join, whose
-    flows to the next instant differ by more than `APART`.
+    A boundary is between two adjacent pixels, side by side or one above the other, whose flows to the next instant differ by
+    more than `APART`. They show different things, or surfaces that do not join.
     """
     out = np.zeros(context.visibility.triangle.shape, np.uint8)
     own, match = context.own_view, context.match(Next())
@@ -58,7 +58,7 @@ def _sides(axis: int) -> tuple[tuple[slice, ...], tuple[slice, ...]]:
 
 
 def prove(sample: Sample, models: Models) -> Iterator[str]:
-    """A boundary has a neighbour that moves otherwise."""
+    """A boundary has a neighbour that moves differently."""
     boundaries, vectors = channel_of(sample, "motion_boundaries"), channel_of(sample, "flow")
     if boundaries is None or vectors is None:
         return

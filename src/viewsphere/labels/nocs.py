@@ -1,4 +1,4 @@
-"""nocs: where on its object the seen point is, as a share of the object's size."""
+"""nocs: the position of the seen point on its object, as a share of the object's size."""
 
 from __future__ import annotations
 
@@ -17,15 +17,16 @@ if TYPE_CHECKING:
     from viewsphere.labels.shared.context import LabelContext
 
 TOLERANCE = 1e-6
-"""By how much float32 may lie outside of 0 to 1."""
+"""Amount by which float32 may be outside 0 to 1."""
 
 
 def compute(context: LabelContext) -> NDArray[np.float32]:
-    """Normalised object coordinates (H, W, 3), 0 to 1 in the object's axes; NaN on scenery, ground and where nothing is seen.
+    """Normalised object coordinates (H, W, 3), 0 to 1 in the object's axes; NaN on scenery, on ground, and where nothing is
+    seen.
 
     Wang et al. 2019, "Normalized Object Coordinate Space for Category-Level 6D Object Pose and Size Estimation": the diagonal
-    of the object's tight box has the length 1, and the box's centre is (0.5, 0.5, 0.5). The box is that of the model as it is
-    then, `box3d_object`; the axes are the model's own (front -Y, up +Z). The paper's files keep z as 1 - z.
+    of the object's tight box has the length 1, and the box's centre is (0.5, 0.5, 0.5). The box is `box3d_object`, that of the
+    model at this instant; the axes are the model's own (front -Y, up +Z). The paper's files store z as 1 - z.
     """
     from viewsphere.truth.raster import kernels_channels as kernels
 
@@ -39,7 +40,7 @@ def compute(context: LabelContext) -> NDArray[np.float32]:
 
 
 def prove(sample: Sample, models: Models) -> Iterator[str]:
-    """The points that shares of the objects' boxes stand for are `coordinates`, and seen in their pixels, at their depth."""
+    """The points, converted from shares to metres, equal `coordinates` and are at their pixels and depth."""
     shares, instances = channel_of(sample, "nocs"), channel_of(sample, "instances")
     if shares is None:
         return
@@ -73,7 +74,7 @@ def _of_object(sample: Sample, o: ObjectAnnotation, shares: Array, own: NDArray[
 
 
 def picture(shares: NDArray[np.float32]) -> Picture:
-    """Shares as a picture (H, W, 3) uint8, as NOCS maps are shown: x is red, y green, z blue; black where there are none."""
+    """Shares as a picture (H, W, 3) uint8, as NOCS maps are shown: x is red, y green, z blue; black without a value."""
     known = np.isfinite(shares).all(axis=-1, keepdims=True)
     return (np.clip(np.where(known, shares, 0.0), 0, 1) * 255).round().astype(np.uint8)
 

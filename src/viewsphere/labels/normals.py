@@ -1,4 +1,4 @@
-"""normals and normals_geometric: the direction in which the seen surface faces, as shaded and of its triangle."""
+"""normals and normals_geometric: the direction that the seen surface faces, as shaded and from its triangle."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from viewsphere.labels.shared.context import LabelContext
 
 TOLERANCE = 1e-5
-"""Length by which stored float32 directions may differ from 1: rounding alone gives some 1e-7."""
+"""Tolerated difference of a stored float32 direction's length from 1; rounding alone gives about 1e-7."""
 
 
 def shading_normals(context: LabelContext) -> NDArray[np.float32]:
@@ -55,7 +55,7 @@ def _prove(sample: Sample, name: str) -> Iterator[str]:
 
 
 def picture(normals: Array) -> Picture:
-    """Normals as a picture (H, W, 3) uint8, as normal maps have them: red to the right, green up, blue towards the camera."""
+    """Normals as a picture (H, W, 3) uint8, as in normal maps: red to the right, green up, blue towards the camera."""
     right, down, away = np.moveaxis(normals.astype(np.float64), -1, 0)
     shares = (np.stack([right, -down, -away], axis=-1) + 1) / 2
     is_seen = (right != 0) | (down != 0) | (away != 0)

@@ -22,11 +22,11 @@ if TYPE_CHECKING:
     from viewsphere.labels.shared.context import LabelContext
 
 TOLERANCE = 1e-6
-"""Pixels by which rounding may push a corner."""
+"""Pixels by which rounding may move a corner."""
 
 
 def compute(context: LabelContext, i: int) -> Mapping[str, Any]:
-    """Both rectangles; that of the model where the lens shows all of its vertices."""
+    """Both rectangles; the model's only if the lens shows all of its vertices."""
     seen = context.instances
     x0, y0, x1, y1 = seen.box[i + 1].tolist() if seen.area[i + 1] else (0, 0, 0, 0)
     return {"obb": _around(seen.ids[y0:y1, x0:x1] == i + 1, x0, y0), "obb_projected": _projected(context, i)}
@@ -48,7 +48,7 @@ def _around(part: Any, x0: int, y0: int) -> Any:
 
 
 def restore(kept: Any, placement: Placement, o: ObjectAnnotation) -> Mapping[str, Any]:
-    """The rectangle of the mask, and that of the model, which is kept."""
+    """The rectangle of the mask, and the stored rectangle of the model."""
     if o.box2d is None:
         return {"obb": None, "obb_projected": None if kept is None else np.array(kept, np.float64)}
     x0, y0, x1, y1 = map(int, o.box2d)
@@ -57,7 +57,7 @@ def restore(kept: Any, placement: Placement, o: ObjectAnnotation) -> Mapping[str
 
 
 def keep(o: ObjectAnnotation) -> Any:
-    """The model's rectangle; the mask is kept already."""
+    """The model's rectangle; the mask is stored already."""
     return None if o.obb_projected is None else o.obb_projected.tolist()
 
 
@@ -100,7 +100,7 @@ def _tight(corners: Any, points: Any, slack: float) -> Iterator[str]:
 
 
 def draw(pen: ImageDraw, sample: Sample, scale: float) -> None:
-    """The rectangle of each object's visible pixels, in its colour; that of its model thinner."""
+    """The rectangle of each object's visible pixels, in its colour, and its model's rectangle as a thinner line."""
     for o in sample.objects:
         for corners, width in ((o.obb, 2), (o.obb_projected, 1)):
             if corners is not None:

@@ -1,4 +1,4 @@
-"""occluders: what hides an object, and how much of it."""
+"""occluders: the things that hide an object, and the share of it that each hides."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class Occluder:
 
 
 def compute(context: LabelContext, i: int) -> Mapping[str, Any]:
-    """Return the things that the hidden pixels of the object show; of several things before it, the nearest counts."""
+    """Return the things that are seen at the object's hidden pixels; of several things in front of it, the nearest counts."""
     if context.is_unobstructed(i):
         return {"occluders": ()}
     alone = context.isolated(i).in_image(context.camera.width, context.camera.height)
@@ -67,7 +67,7 @@ def prove(sample: Sample, models: Models) -> Iterator[str]:
 
 
 def draw(pen: ImageDraw, sample: Sample, scale: float) -> None:
-    """An arrow from each object to what hides it, with the share in words."""
+    """An arrow from each object to each of its occluders, with the share as text."""
     by_id = {o.id: o for o in sample.objects}
     for o in sample.objects:
         for one in o.occluders:

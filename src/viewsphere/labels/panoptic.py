@@ -1,4 +1,4 @@
-"""panoptic: class and object in one number, things and stuff."""
+"""panoptic: class and object id in one number, for things and stuff."""
 
 from __future__ import annotations
 
@@ -20,17 +20,17 @@ if TYPE_CHECKING:
     from viewsphere.labels.shared.context import LabelContext
 
 BITS = 16
-"""Of an object's id; the class is above them."""
+"""Number of bits for an object's id; the class is in the bits above them."""
 
 MOST = (1 << BITS) - 1, (1 << (31 - BITS)) - 1
 """The greatest id of an object, and of a class."""
 
 
 def compute(context: LabelContext) -> NDArray[np.int32]:
-    """class * 65536 + object id, (H, W): the class is that of `semantic`, the id that of `instances`, 0 of stuff.
+    """class * 65536 + object id, (H, W): the class is from `semantic`, the id from `instances` (0 for stuff).
 
-    So it has the segments of Kirillov et al. 2019, "Panoptic Segmentation". Raises StoreError for more than 65535 objects, or
-    classes above 32767, which the number has no room for.
+    So it has the segments of Kirillov et al. 2019, "Panoptic Segmentation". Raises StoreError for more than 65535 objects or
+    classes above 32767, which do not fit into the number.
     """
     classes = context.geometry.triangle_class
     found = context.geometry.object_count, int(classes.max(initial=0))
@@ -48,7 +48,7 @@ def class_of(codes: Array) -> Array:
 
 
 def object_of(codes: Array) -> Array:
-    """The objects' ids in a map, 0 of stuff."""
+    """The objects' ids in a map, 0 for stuff."""
     return codes & MOST[0]
 
 
@@ -64,12 +64,12 @@ def prove(sample: Sample, models: Models) -> Iterator[str]:
 
 
 def renumbered(codes: Array, ids: Mapping[int, int]) -> Array:
-    """The map where categories have other ids."""
+    """The map with new ids for categories."""
     return with_classes(class_of(codes), ids) << BITS | object_of(codes)
 
 
 def with_objects(codes: Array, ids: Mapping[int, int]) -> Array:
-    """The map where objects have other ids."""
+    """The map with new ids for objects."""
     return class_of(codes) << BITS | by_table(object_of(codes), ids)
 
 

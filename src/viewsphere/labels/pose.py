@@ -1,4 +1,4 @@
-"""pose: where an object is, and how it is turned."""
+"""pose: the position and rotation of an object."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def of(placement: Placement) -> Mapping[str, Any]:
 
 
 def prove(sample: Sample, models: Models) -> Iterator[str]:
-    """The pose in camera axes is the pose in world axes seen by the camera, and the quaternion is its rotation."""
+    """The pose in camera axes is the pose in world axes, transformed to the camera; the quaternion is its rotation."""
     if sample.known_camera is None:
         return
     camera_from_world = rigid(sample.camera.R, sample.camera.t)
@@ -44,7 +44,7 @@ def prove(sample: Sample, models: Models) -> Iterator[str]:
 
 
 def draw(pen: ImageDraw, sample: Sample, scale: float) -> None:
-    """Every object's own axes, as long as half of its longest side."""
+    """Every object's own axes, half as long as its longest side."""
     for o in sample.objects:
         axes(pen, sample, scale, o.camera_from_object, max(o.size) / 2)
 

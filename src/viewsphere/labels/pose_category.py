@@ -1,4 +1,4 @@
-"""pose_category: which side of an object is seen."""
+"""pose_category: the side of an object that is seen."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ def of(placement: Placement) -> Mapping[str, Any]:
 
 
 def prove(sample: Sample, models: Models) -> Iterator[str]:
-    """The category is top or bottom from 60 degrees up or down, and else says above or below as the elevation does."""
+    """The category is top or bottom from 60 degrees up or down; otherwise its above or below matches the elevation."""
     for o in rendered(sample):
         elevation, name = round(o.view.elevation_deg, 6), o.pose_category
         ends = {"top": elevation >= 60, "bottom": elevation <= -60}

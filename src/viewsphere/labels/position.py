@@ -1,4 +1,4 @@
-"""position: where in the world the seen point is."""
+"""position: the position of the seen point in the world."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ STRIPES = 2
 
 
 def compute(context: LabelContext) -> NDArray[np.float32]:
-    """The seen point in the world's axes, (H, W, 3) metres: of objects, scenery and ground; NaN where nothing is seen.
+    """The seen point in the world's axes, (H, W, 3) metres, on objects, scenery and ground; NaN where nothing is seen.
 
-    It is the pixel's ray from the camera's centre, times 1/s of `truth.raster.visibility`: it lies on that ray and at `depth`.
+    It is the pixel's ray from the camera's centre, times 1/s of `truth.raster.visibility`, so it is on that ray and at `depth`.
     """
     from viewsphere.truth.raster import kernels_channels as kernels
 
@@ -35,7 +35,7 @@ def compute(context: LabelContext) -> NDArray[np.float32]:
 
 
 def prove(sample: Sample, models: Models) -> Iterator[str]:
-    """Points are seen in their pixels, at their depth, and are the object's coordinates, moved by its pose."""
+    """Points are at their pixels and depth, and equal the object's coordinates, moved by its pose."""
     points = channel_of(sample, "position")
     if points is None:
         return
@@ -70,12 +70,12 @@ def _against_coordinates(sample: Sample, points: Array, seen: NDArray[np.bool_])
 
 
 def _slack(sample: Sample, world: Float) -> Float:
-    """Metres by which rounding may move points (N, 3): a share of how far they are from the camera and from the origin."""
+    """Metres by which rounding may move points (N, 3): a share of their distances from the camera and from the origin."""
     return ROUNDING * (2 * largest(world - sample.camera.center) + largest(world))
 
 
 def striped(points: NDArray[np.float32]) -> Picture:
-    """Points as a picture (H, W, 3) uint8: red goes with x, green with y, blue with z, up and down again in each metre."""
+    """Points as a picture (H, W, 3) uint8: red follows x, green y, blue z, rising and falling within each metre."""
     seen = np.isfinite(points).all(axis=-1, keepdims=True)
     share = np.abs((np.where(seen, points, 0.0) * STRIPES / 2) % 1 * 2 - 1)
     return np.where(seen, 60 + 195 * (1 - share), 0).round().astype(np.uint8)

@@ -1,4 +1,4 @@
-"""referring: expressions that single one object out of all that are visible."""
+"""referring: expressions that identify one object among all visible ones."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ if TYPE_CHECKING:
     from viewsphere.labels.shared.context import LabelContext
 
 APART = 0.02
-"""Share of the picture's width by which the leftmost and the rightmost are apart from the next."""
+"""Minimum distance of the leftmost and the rightmost object from the next, as a share of the picture's width."""
 
 EXTREMES = ("leftmost", "rightmost", "nearest", "farthest")
 
@@ -55,8 +55,8 @@ class Referring(Frozen):
 
 @dataclass(frozen=True)
 class Expression:
-    """An expression that holds of one object alone, and its parts: words, empty where they are not used, and the id of the
-    object that a relation is to, 0 without.
+    """An expression that is true of only one object, and its parts: words (empty if not used), and the id of the object that a
+    relation refers to (0 without one).
     """
 
     object: int
@@ -79,7 +79,7 @@ class Scene:
 
     @cached_property
     def relations(self) -> Mapping[str, Truths]:
-        """For each relation (N, N) whether it holds of the row's object to the column's."""
+        """For each relation a mask (N, N): True where the row's object has the relation to the column's."""
         return Company(self.objects).relations
 
     @cached_property
@@ -89,7 +89,7 @@ class Scene:
 
     @cached_property
     def sorts(self) -> Mapping[tuple[str, Words], Truths]:
-        """For each noun with some words for looks (N,) whether its noun phrase holds of the objects."""
+        """For each noun with its words for appearance a mask (N,): True for the objects that its noun phrase fits."""
         found: dict[tuple[str, Words], Truths] = {}
         for i, o in enumerate(self.objects):
             for _, own in phrases(o, self.words[o.id]):
@@ -97,7 +97,7 @@ class Scene:
         return found
 
     def sort(self, i: int, own: Words) -> Truths:
-        """Of which objects the noun phrase of object i with these words holds, (N,)."""
+        """A mask (N,) of the objects that fit the noun phrase of object i with these words."""
         return self.sorts[noun_of(self.objects[i].category), own]
 
     def kinds(self, i: int) -> Iterator[tuple[str, Words]]:
@@ -106,8 +106,8 @@ class Scene:
 
     @cached_property
     def landmarks(self) -> Mapping[int, tuple[str, int]]:
-        """For the number of each object that a noun phrase alone singles out: the shortest one, and how many words for looks it
-        has.
+        """For each object that a noun phrase alone identifies, by the object's number: the shortest such phrase, and its
+        number of words for appearance.
         """
         found: dict[int, tuple[str, int]] = {}
         for i in range(len(self.objects)):
@@ -118,7 +118,7 @@ class Scene:
         return found
 
     def extreme(self, name: str, sort: Truths) -> int | None:
-        """The number of the object that is the leftmost, ... of those of a sort, None where none is clearly."""
+        """The number of the object that is the leftmost, ... of those of a sort; None if no object clearly is."""
         at = np.flatnonzero(sort)
         if name in ("leftmost", "rightmost"):
             sign = 1.0 if name == "leftmost" else -1.0
@@ -141,7 +141,7 @@ class Scene:
         return np.array([o.view.distance for o in self.objects])
 
     def expression(self, i: int) -> Expression | None:
-        """The shortest expression that holds of object i alone.
+        """The shortest expression that is true only of object i.
 
         Full brevity of R. Dale and E. Reiter, https://arxiv.org/abs/cmp-lg/9504020, in the order of preference of their
         incremental algorithm among expressions of one length.
@@ -150,7 +150,7 @@ class Scene:
         return found and found[1]
 
     def _candidates(self, i: int) -> Iterator[tuple[tuple[int, int], Expression]]:
-        """Expressions that hold of object i alone, with their lengths and how their kinds rank."""
+        """Expressions that are true only of object i, with their lengths and the ranks of their kinds."""
         o = self.objects[i]
         for phrase, own in self.kinds(i):
             sort, length, (color, material) = self.sort(i, own), _used(own), own
@@ -162,8 +162,8 @@ class Scene:
                 yield (length + more, rank), one
 
     def _located(self, i: int, sort: Truths, phrase: str, plain: Expression) -> Iterator[tuple[int, int, Expression]]:
-        """Expressions that single object i out of those of its sort by where it is, with how many words more they have, and the
-        ranks of their kinds.
+        """Expressions that identify object i among those of its sort by its location, with their number of additional words
+        and the ranks of their kinds.
         """
         own = np.arange(len(self.objects)) == i
         place = self.places[i]
@@ -185,7 +185,7 @@ def _used(own: Words) -> int:
 
 
 def compute(context: LabelContext, objects: Sequence[ObjectAnnotation]) -> Mapping[str, Any]:
-    """The expressions, in the order of the objects' ids; of a LiDAR's picture none."""
+    """The expressions, in the order of the objects' ids; none for a LiDAR's picture."""
     options, scenery = context.options_of("referring", Referring), context.get(ShotAppearance())
     if scenery is None:
         raise ValueError("referring: expected a sample of a shot, found none")
@@ -228,7 +228,9 @@ def _said(one: Expression | None) -> str:
 
 
 def _text(one: Expression, by_id: Mapping[int, ObjectAnnotation]) -> str | None:
-    """The text that the parts of an expression make; as it is where there is a landmark, whose words are not kept."""
+    """The text made from an expression's parts. An expression with a landmark keeps its text, because the landmark's words are
+    not stored.
+    """
     phrase = noun_phrase(noun_of(by_id[one.object].category), one.color, one.material)
     if one.landmark:
         begins = f"the {phrase} that is {one.relation} the "

@@ -19,15 +19,15 @@ if TYPE_CHECKING:
 
 
 def scene_flow(context: LabelContext, to: Next | Previous) -> NDArray[np.float32]:
-    """Return X at another instant less X now, (H, W, 3) metres, each in its own instant's camera axes: the camera's motion
-    is in it. NaN of the sky, and of what is not there then.
+    """Return X at another instant minus X now, (H, W, 3) metres, each in its own instant's camera axes, so it includes the
+    camera's motion. NaN for the sky, and for things that are absent at that instant.
     """
     match = context.match(to)
     return np.full((*context.visibility.triangle.shape, 3), np.nan, np.float32) if match is None else match.scene_flow
 
 
 def _prove(sample: Sample, name: str, state: str) -> Iterator[str]:
-    """Points that are seen, and not gone, have scene flow, and nothing else has."""
+    """Exactly the seen points that do not disappear have scene flow."""
     vectors, states, depth = (channel_of(sample, n) for n in (name, state, "depth"))
     if vectors is None:
         return

@@ -1,4 +1,4 @@
-"""semantic: the class of what is seen, things and stuff."""
+"""semantic: the class at each pixel, for things and stuff."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from viewsphere.model.sample import Sample
 
 
 def prove(sample: Sample, models: Models) -> Iterator[str]:
-    """Objects are of their categories' classes, all else is stuff, and where nothing is seen is sky."""
+    """Objects have their categories' classes, everything else is stuff, and empty pixels are sky."""
     classes, instances = channel_of(sample, "semantic"), channel_of(sample, "instances")
     if classes is not None and instances is not None:
         yield from wrong_classes(sample, classes, instances)

@@ -1,4 +1,4 @@
-"""sensor_poses: where the other sensors of the rig are, as the picture's own camera sees them."""
+"""sensor_poses: the poses of the rig's sensors, in the axes of the picture's own camera."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ TOLERANCE = 1e-9
 
 
 def compute(context: LabelContext, objects: Sequence[ObjectAnnotation]) -> Mapping[str, Any]:
-    """The poses of all sensors at the picture's instant, its own among them."""
+    """The poses of all sensors at the picture's instant, including its own."""
     now = context.get(RigPoses())
     if now is None:
         raise ValueError("sensor_poses: expected a sample of a rig, found none")
@@ -45,7 +45,8 @@ def prove(sample: Sample, models: Models) -> Iterator[str]:
 
 
 def draw(pen: ImageDraw, sample: Sample, scale: float) -> None:
-    """A small map in the lower right corner, in which the own sensor is white; and the axes of those others that it sees."""
+    """A small map in the lower right corner, with the picture's own sensor in white, and the axes of the other visible sensors.
+    """
     own = np.abs(sample.camera_from_sensors - np.eye(4)).max(axis=(1, 2)).argmin()
     poses = [(pose, OWN if i == own else color_of(i + 1)) for i, pose in enumerate(sample.camera_from_sensors)]
     inset(pen, sample, scale, poses, at_right=True)
@@ -57,7 +58,7 @@ def draw(pen: ImageDraw, sample: Sample, scale: float) -> None:
 
 
 AXIS = 0.1
-"""Metres of a sensor's axes that are drawn."""
+"""Length of a sensor's drawn axes, metres."""
 
 
 LABEL = SampleLabel(

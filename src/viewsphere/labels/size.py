@@ -1,4 +1,4 @@
-"""size: how large an object is."""
+"""size: the extents of an object's box, and its true size."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def of(placement: Placement) -> Mapping[str, Any]:
 
 
 def prove(sample: Sample, models: Models) -> Iterator[str]:
-    """Sizes are those of the box and of the model."""
+    """Sizes match the box and the model."""
     for o in rendered(sample):
         low, high = o.box3d_object.min(axis=0), o.box3d_object.max(axis=0)
         x, y, z = (high - low).tolist()

@@ -1,4 +1,4 @@
-"""tracks: where the points that a sensor follows through a sequence are, and whether they are seen."""
+"""tracks: the positions of the points that a sensor follows through a sequence, and whether they are seen."""
 
 from __future__ import annotations
 
@@ -32,8 +32,9 @@ WORST = 4
 
 
 def compute(context: LabelContext) -> NDArray[np.void]:
-    """One row a point, (N,) of `viewsphere.model.annotations.tracks.TRACK`. Raises ValueError if the shot follows none."""
-    followed = context.get(FollowedPoints())  # first: its triangles may take the place of a view's
+    """One row per point, (N,) of `viewsphere.model.annotations.tracks.TRACK`. Raises ValueError if the shot follows no points.
+    """
+    followed = context.get(FollowedPoints())  # first, because its triangles may overwrite a view's
     own = context.own_view
     if own is None or followed is None:
         raise ValueError("tracks: expected a sample of a sequence, found none")
@@ -48,7 +49,7 @@ def compute(context: LabelContext) -> NDArray[np.void]:
 
 
 def prove(sample: Sample, models: Models) -> Iterator[str]:
-    """States are valid, points are on objects of the sample, and each point that is not invalid has a place."""
+    """States are valid, points are on objects of the sample, and each point that is not invalid has a position."""
     rows = channel_of(sample, "tracks")
     if rows is None:
         return
@@ -65,8 +66,8 @@ def prove(sample: Sample, models: Models) -> Iterator[str]:
 
 
 def draw(pen: ImageDraw, samples: Sequence[Sample], scale: float) -> None:
-    """Each point in the colour of the position where it was picked: filled where it is seen, hollow where something hides it,
-    and a line behind it from where it was at the instants before. A sample's points are the rows of its own sensor.
+    """Each point in the colour of the position where it was picked: filled if it is seen, hollow if something hides it. A line
+    leads to it from its positions at the instants before. A sample's points are the rows of its own sensor.
     """
     now = samples[-1]
     rows = now.channels["tracks"]
@@ -85,7 +86,7 @@ def draw(pen: ImageDraw, samples: Sequence[Sample], scale: float) -> None:
 
 
 def _whole_end(places: list[tuple[float, float]]) -> list[tuple[float, float]]:
-    """The last places, as many as are known."""
+    """The last positions, back to the first unknown one."""
     unknown = next((i for i, place in enumerate(reversed(places)) if not np.isfinite(place).all()), len(places))
     return places[len(places) - unknown :]
 
@@ -96,14 +97,14 @@ def positions(sample: Sample) -> NDArray[np.float64]:
 
 
 def in_camera(sample: Sample) -> NDArray[np.float64]:
-    """A sample's points in its camera's axes, (N, 3) metres; of the sky a direction."""
+    """A sample's points in its camera's axes, (N, 3) metres; a direction for points of the sky."""
     camera, point = sample.camera, sample.channels["tracks"]["point"]
     turned = transform(camera.R, point[:, :3])
     return np.where(point[:, 3:] == 0.0, turned, turned + camera.t)
 
 
 def colors_of(rows: NDArray[np.void], width: int, height: int) -> list[Color]:
-    """A colour for each of the points: its hue goes with x, its lightness with y of the position where it was picked."""
+    """A colour for each point: the hue follows x and the lightness y of the position where it was picked."""
     hue, light = rows["query"][:, 0] / width, 0.68 - 0.28 * rows["query"][:, 1] / height
     tones = (hls_to_rgb(0.83 * h, v, 1.0) for h, v in zip(hue.tolist(), light.tolist(), strict=True))
     return [(round(255 * r), round(255 * g), round(255 * b)) for r, g, b in tones]

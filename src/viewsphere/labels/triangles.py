@@ -1,4 +1,4 @@
-"""triangles: which triangle of its object's model is seen."""
+"""triangles: the index of the seen triangle in its object's model."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 def compute(context: LabelContext) -> NDArray[np.int32]:
-    """Index (H, W) of the triangle within its object; -1 on scenery, ground and where nothing is seen."""
+    """Index (H, W) of the triangle within its object; -1 on scenery, on ground, and where nothing is seen."""
     g = context.geometry
     index = np.full(len(g.triangles), -1, np.int32)
     for first, last in pairwise(g.triangle_start[: g.object_count + 1]):
@@ -28,7 +28,7 @@ def compute(context: LabelContext) -> NDArray[np.int32]:
 
 
 def prove(sample: Sample, models: Models) -> Iterator[str]:
-    """Objects have triangles, the background has no triangle."""
+    """Objects have triangles; the background has none."""
     triangles, instances = channel_of(sample, "triangles"), channel_of(sample, "instances")
     if triangles is not None and instances is not None and ((triangles >= 0) != (instances > 0)).any():
         wrong = ((triangles >= 0) != (instances > 0)).sum()

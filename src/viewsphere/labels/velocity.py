@@ -1,4 +1,4 @@
-"""velocity: how fast an object moves, turns and speeds up."""
+"""velocity: the velocity, angular velocity and acceleration of an object."""
 
 from __future__ import annotations
 
@@ -30,11 +30,11 @@ FIELDS = ("velocity", "angular_velocity", "acceleration")
 
 
 def compute(context: LabelContext, i: int) -> Mapping[str, Any]:
-    """Differences of the poses at the instants next to this one, of the middle of the object's box: central ones; at a
-    sequence's ends, and where the object comes or goes, one-sided ones without an acceleration.
+    """Central differences between the poses at the adjacent instants, for the middle of the object's box. At a sequence's ends,
+    and where the object appears or disappears, they are one-sided differences without an acceleration.
 
-    Of a model that deforms the point is the middle of the box at this instant and moves with the pose: its own motion counts,
-    that of its surface does not.
+    For a model that deforms, the point is the middle of the box at this instant and moves with the pose. So the object's motion
+    counts, but the motion of its surface does not.
     """
     placement = context.placement(i)
     middle = Box3d(placement.box).center
@@ -73,7 +73,7 @@ def prove(sample: Sample, models: Models) -> Iterator[str]:
 
 
 def draw(pen: ImageDraw, sample: Sample, scale: float) -> None:
-    """A line from the middle of each object's box to where that is half a second later."""
+    """A line from the middle of each object's box to its position half a second later."""
     for o in sample.objects:
         if o.velocity is not None:
             center = Box3d(o.box3d).center

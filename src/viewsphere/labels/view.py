@@ -1,4 +1,4 @@
-"""view: the camera as an object sees it."""
+"""view: the position of the camera relative to an object."""
 
 from __future__ import annotations
 

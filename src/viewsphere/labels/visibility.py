@@ -1,4 +1,4 @@
-"""visibility: how much of an object is seen, and how much lies outside of the image."""
+"""visibility: the visible share of an object, and its share outside the image."""
 
 from __future__ import annotations
 
@@ -20,9 +20,10 @@ if TYPE_CHECKING:
 def compute(context: LabelContext, i: int) -> Mapping[str, Any]:
     """Both shares of one object.
 
-    Visibility is the object's visible pixels over all pixels that it would cover alone, on a canvas of three times the image's
-    width and height (BOP's visib_fract, https://github.com/thodan/bop_toolkit/blob/master/docs/bop_datasets_format.md);
-    truncation is the share of the latter outside the image. An object that covers no pixel has visibility 0.
+    Visibility is the object's visible pixels over all pixels that it would cover if it were alone, on a canvas of three times
+    the image's width and height (BOP's visib_fract,
+    https://github.com/thodan/bop_toolkit/blob/master/docs/bop_datasets_format.md); truncation is the share of the latter
+    outside the image. An object that covers no pixel has visibility 0.
     """
     visible, truncated = _shares(context, i, int(context.instances.area[i + 1]))
     return {"visibility": visible, "truncation": truncated}
@@ -33,7 +34,7 @@ def _shares(context: LabelContext, i: int, area: int) -> tuple[float, float]:
     if own is None:
         if not area:
             return 0.0, 1.0
-        own = EVERYWHERE  # the object is visible, but all nearer than the distance at which projected boxes begin
+        own = EVERYWHERE  # the object is visible, but nearer than the near limit of projected boxes
     width, height = context.camera.width, context.camera.height
     image = (0.0, 0.0, float(width), float(height))
     if whole and not overlap(own, image):
@@ -50,14 +51,14 @@ def _shares(context: LabelContext, i: int, area: int) -> tuple[float, float]:
 
 
 def _pixels_alone(context: LabelContext, i: int) -> tuple[int, int]:
-    """Number of pixels that the object alone would cover on the large canvas, and how many of these lie in the image."""
+    """Number of pixels that the object alone would cover on the large canvas, and the number of these inside the image."""
     alone = context.isolated(i)
     inside = alone.in_image(context.camera.width, context.camera.height)
     return int(np.count_nonzero(alone.inverse_depth)), int(np.count_nonzero(inside.inverse_depth))
 
 
 def prove(sample: Sample, models: Models) -> Iterator[str]:
-    """Both shares lie in [0, 1], and visibility is above 0 exactly for objects with visible pixels."""
+    """Both shares are in [0, 1], and visibility is above 0 exactly for objects with visible pixels."""
     for o in rendered(sample):
         shares, seen = (o.visibility, o.truncation), int(o.mask.sum())
         if not all(0 <= share <= 1 for share in shares) or (o.visibility > 0) != (seen > 0):

@@ -1,4 +1,4 @@
-"""voxels: what is in each cell of a grid before the camera, seen or not."""
+"""voxels: the content of each cell of a grid in front of the camera, seen or not."""
 
 from __future__ import annotations
 
@@ -44,21 +44,21 @@ Float = NDArray[np.float64]
 Rows = NDArray[np.int64]
 
 BORDER = 1e-3
-"""Cells by which rounding may move an object's box."""
+"""Distance, in cells, by which rounding may move an object's box."""
 
 SLAB = 1 << 16
-"""Cells whose centres are projected at once."""
+"""Number of cells whose centres are projected at once."""
 
 MESHES = 256
-"""Meshes of which it is kept which of their pieces are closed."""
+"""Number of meshes in the cache of `_known`."""
 
 
 def compute(context: LabelContext) -> NDArray[np.void]:
     """The cells of the grid, its first axis slowest, as runs of equal ones, (N,) of `viewsphere.model.annotations.voxels.RUN`.
 
-    A cell is an object's where a triangle has a part in it, or, for pieces of objects that are closed, where its centre is
-    inside; scenery's and the ground's where a triangle has a part in it. Of several things in a cell it is the first one's:
-    objects by their ids, then scenery, then the ground. Where only some of a triangle is surface, all of it counts.
+    A cell belongs to an object if part of a triangle is in it or, for closed pieces of objects, if its centre is inside. It
+    belongs to scenery or the ground if part of a triangle is in it. Of several things in a cell the first counts: objects by
+    their ids, then scenery, then the ground. If only part of a triangle is surface, the whole triangle counts.
     """
     from viewsphere.geometry.voxels import kernels_voxels as kernels
 
@@ -71,7 +71,7 @@ def compute(context: LabelContext) -> NDArray[np.void]:
     cells, pixels = _seen_cells(context, grid)
     triangles = context.visibility.triangle[pixels]
     state.reshape(-1)[cells] = SURFACE
-    missed = owner.reshape(-1)[cells] < 0  # a point of a triangle in a cell's border, by rounding in the next one
+    missed = owner.reshape(-1)[cells] < 0  # a triangle's point on a cell's border, which rounding puts into the next cell
     owner.reshape(-1)[cells[missed]], filled.reshape(-1)[cells[missed]] = triangles[missed], TOUCHED
     table = np.column_stack((context.geometry.triangle_class, context.geometry.triangle_object))
     flat = [array.reshape(-1) for array in (owner, filled, state, indoors)]
@@ -110,13 +110,13 @@ def _shown(context: LabelContext, rows: Rows) -> Rows:
 
 
 def _scenery(context: LabelContext) -> Rows:
-    """The triangles of scenery, without the ground's."""
+    """The triangles of scenery, without the ground."""
     start = context.geometry.triangle_start
     return _shown(context, np.arange(start[context.geometry.object_count], start[-1]))
 
 
 def _closed(context: LabelContext, i: int, rows: Rows) -> NDArray[np.bool_]:
-    """Return a mask of these triangles of thing i: True for triangles of pieces that are closed without others."""
+    """Return a mask of these triangles of thing i: True for triangles of pieces that are closed by themselves."""
     g = context.geometry
     vertices = g.coordinates[g.vertex_start[i] : g.vertex_start[i + 1]]
     triangles = g.triangles[rows] - np.int32(g.vertex_start[i])
@@ -183,7 +183,7 @@ def _along(camera: Camera, points: Float) -> Float:
 
 
 def _seen_cells(context: LabelContext, grid: Grid) -> tuple[Rows, tuple[Rows, Rows]]:
-    """The cells of the points that pixels show, as numbers of flat arrays, and these pixels; without those beyond the grid."""
+    """The cells of the points at pixels, as indices into flat arrays, and these pixels; without points outside the grid."""
     where = np.nonzero(context.visibility.inverse_depth > 0)
     rays = pixel_rays(context.camera.intrinsics)[where]
     depth = 1.0 / context.visibility.inverse_depth[where].astype(np.float64)
@@ -194,12 +194,12 @@ def _seen_cells(context: LabelContext, grid: Grid) -> tuple[Rows, tuple[Rows, Ro
 
 
 def _lifted(camera: Camera, grid: Grid, points: Float) -> Float:
-    """Points (N, 3) of a camera's axes, counted in cells."""
+    """Points (N, 3) in a camera's axes, converted to units of cells."""
     return grid.cells(transform(camera.R.T, points - camera.t))
 
 
 def prove(sample: Sample, models: Models) -> Iterator[str]:
-    """Runs fill the grid, classes match their objects, objects are in their boxes, and depth agrees with surface cells."""
+    """Runs fill the grid, classes match their objects, objects are inside their boxes, and depth agrees with surface cells."""
     runs = channel_of(sample, "voxels")
     if runs is None or sample.known_camera is None:
         return
@@ -265,7 +265,7 @@ def _wrong_surface(sample: Sample, cells: VoxelGrid) -> Iterator[str]:
 
 
 def _inside(grid: Grid, points: Float) -> tuple[Rows, ...]:
-    """The cells of those of some points, counted in cells, that are in the grid."""
+    """The cells of the points inside the grid; points are in units of cells."""
     cells = np.floor(points)
     i, j, k = cells[((cells >= 0) & (cells < grid.size)).all(axis=1)].astype(np.int64).T
     return i, j, k

@@ -1,4 +1,4 @@
-"""Materials that are drawn from numbers: wood, brick, leather, ..., as squares that repeat, in metres.
+"""Procedural materials: wood, brick, leather, ..., as repeating squares, in metres.
 
 A material is one module with a `viewsphere.plugins.material.MaterialSpec`, which draws a `Surface` from frozen parameters.
 """
@@ -17,12 +17,12 @@ __all__ = ["Color", "Light", "Map", "Surface", "drawn", "is_grained", "metres", 
 
 
 def drawn(name: str, seed: int) -> Any:
-    """The parameters that a seed means; raises UserError for an unknown material, with the nearest known one."""
+    """The parameters for a seed; raises UserError for an unknown material, with the nearest known one."""
     return plugins.load(MaterialSpec, name).draw(np.random.default_rng(seed))
 
 
 def surface(name: str, seed: int, size: int) -> Surface:
-    """The material that a seed means, `size` texels a side; equal arguments give the same bytes on every processor.
+    """The material for a seed, `size` texels a side; equal arguments give the same bytes on every processor.
 
     Raises UserError for an unknown name, with the nearest known one.
     """
@@ -30,7 +30,7 @@ def surface(name: str, seed: int, size: int) -> Surface:
 
 
 def metres(name: str, seed: int) -> float:
-    """After how many metres the material that a seed means repeats."""
+    """The distance in metres after which the material for a seed repeats."""
     return drawn(name, seed).metres
 
 
@@ -40,5 +40,5 @@ def word(name: str) -> str:
 
 
 def is_grained(name: str) -> bool:
-    """Return whether a material runs along the longest side of what is made of it."""
+    """Return whether a material's grain runs along the longest side of a thing."""
     return plugins.load(MaterialSpec, name).grained

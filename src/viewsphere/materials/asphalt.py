@@ -14,7 +14,9 @@ from viewsphere.plugins.material import MaterialSpec
 
 @dataclass(frozen=True)
 class Asphalt:
-    """Linear colours of bitumen and of dark and light stones, the largest stones' metres; how much stone shows; cracks."""
+    """Linear colours of bitumen and of dark and light stones, size of the largest stones in metres; amounts of visible stone
+    and of cracks.
+    """
 
     bitumen: Color = (0.048, 0.048, 0.05)
     stones: tuple[Color, Color] = ((0.08, 0.08, 0.081), (0.25, 0.243, 0.23))

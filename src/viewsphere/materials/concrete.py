@@ -14,7 +14,7 @@ from viewsphere.plugins.material import MaterialSpec
 
 @dataclass(frozen=True)
 class Concrete:
-    """Linear colour; how strong clouds, stains and pores are, 0 to 1; panels a side, with a seam between them, 0 for none."""
+    """Linear colour; strength of clouds, stains and pores, 0 to 1; panels per side, with seams between them, 0 for none."""
 
     color: Color = (0.41, 0.40, 0.38)
     clouds: float = 0.5

@@ -14,7 +14,7 @@ from viewsphere.plugins.material import MaterialSpec
 
 @dataclass(frozen=True)
 class Leather:
-    """Linear colour; the `pebble`'s size in metres, how deep creases are, how rubbed it is, 0 to 1, and its roughness."""
+    """Linear colour; the `pebble`'s size in metres, the depth of creases, the wear, 0 to 1, and the roughness."""
 
     color: Color = (0.21, 0.085, 0.04)
     pebble: float = 0.0028

@@ -14,7 +14,7 @@ from viewsphere.plugins.material import MaterialSpec
 
 @dataclass(frozen=True)
 class Marble:
-    """Linear colours of the stone, its clouds and its veins; veins: how many and how dark, 0 to 1."""
+    """Linear colours of the stone, its clouds and its veins; `veins`: their amount and darkness, 0 to 1."""
 
     color: Color = (0.74, 0.73, 0.71)
     cloud: Color = (0.56, 0.56, 0.56)
@@ -26,7 +26,7 @@ class Marble:
 
 
 def marble(parameters: Marble | None = None, size: int = 512) -> Surface:
-    """The stone: veins lie where warped noise changes its sign, broad and faint ones below thin and dark ones."""
+    """The stone: veins are where warped noise changes its sign, broad and faint ones below thin and dark ones."""
     p = parameters or Marble()
     clouds, patches = noise(size, 3, p.seed, 7, 0.55), noise(size, 3, p.seed + 1, 4)
     first = np.abs(noise(size, (2, 3), p.seed + 2, 7, 0.52) + 0.3 * clouds)

@@ -13,7 +13,7 @@ from viewsphere.plugins.material import MaterialSpec
 
 @dataclass(frozen=True)
 class Metal:
-    """Linear colour of what it mirrors; its roughness; how strong brushing, dents and tarnish are, 0 to 1."""
+    """Linear colour of reflections; roughness; strength of brushing, dents and tarnish, 0 to 1."""
 
     color: Color = (0.56, 0.57, 0.58)
     finish: float = 0.3

@@ -15,7 +15,7 @@ from viewsphere.plugins.material import MaterialSpec
 
 @dataclass(frozen=True)
 class Paper:
-    """Linear colour; how strong fibres and creases are, 0 to 1; flutes: waves of cardboard over `metres`, 0 for none."""
+    """Linear colour; strength of fibres and creases, 0 to 1; flutes: waves of cardboard over `metres`, 0 for none."""
 
     color: Color = (0.70, 0.68, 0.62)
     fibres: float = 0.4

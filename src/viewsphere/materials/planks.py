@@ -16,8 +16,8 @@ from viewsphere.plugins.material import MaterialSpec
 
 @dataclass(frozen=True)
 class Planks:
-    """`rows` of planks over `metres`, `columns` in each, and the `joint` between them, metres; contrast: how unlike one another
-    planks are; finish: the roughness of the varnish.
+    """`rows` of planks over `metres`, `columns` in each, and the `joint` between them, metres; contrast: the difference between
+    planks; finish: the roughness of the varnish.
     """
 
     timber: Timber = OAK

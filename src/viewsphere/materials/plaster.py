@@ -14,7 +14,7 @@ from viewsphere.plugins.material import MaterialSpec
 
 @dataclass(frozen=True)
 class Plaster:
-    """Linear colour of the paint; how strong grains, strokes of the trowel, and stains are, 0 to 1."""
+    """Linear colour of the paint; strength of grains, strokes of the trowel, and stains, 0 to 1."""
 
     color: Color = (0.70, 0.67, 0.60)
     grains: float = 0.5

@@ -14,7 +14,7 @@ from viewsphere.plugins.material import MaterialSpec
 
 @dataclass(frozen=True)
 class Plastic:
-    """Linear colour and roughness; how strong the grain of its mould and scuffs are, 0 to 1."""
+    """Linear colour and roughness; strength of the mould's grain and of scuffs, 0 to 1."""
 
     color: Color = (0.05, 0.18, 0.42)
     finish: float = 0.3

@@ -14,7 +14,7 @@ from viewsphere.plugins.material import MaterialSpec
 
 @dataclass(frozen=True)
 class Sand:
-    """Linear colour; `ripples` over `metres` and how high they are, metres; pebbles: how many, 0 to 1."""
+    """Linear colour; number of `ripples` over `metres`, and their height in metres; pebbles: their amount, 0 to 1."""
 
     color: Color = (0.45, 0.335, 0.195)
     ripples: int = 13

@@ -15,7 +15,7 @@ from viewsphere.plugins.material import MaterialSpec
 
 @dataclass(frozen=True)
 class Wood:
-    """`boards` over `metres`, a kind of timber, and how rough its finish is; contrast: how unlike one another boards are."""
+    """`boards` over `metres`, a kind of timber, and the roughness of its finish; contrast: the difference between boards."""
 
     timber: Timber = OAK
     boards: int = 6

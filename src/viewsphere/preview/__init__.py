@@ -31,8 +31,8 @@ __all__ = [
 
 
 def small_objects(samples: Iterable[Sample], recipe: Recipe | None = None) -> Iterator[str]:
-    """A warning that counts visible objects whose boxes are less than `SMALLEST` pixels wide and high. Of samples that are a
-    preview of a recipe, in the pixels of the recipe's pictures.
+    """A warning that counts visible objects whose boxes are less than `SMALLEST` pixels wide and high. For a preview of a
+    recipe, sizes are in pixels of the recipe's pictures.
     """
     widths = {} if recipe is None else {sensor.name: sensor.intrinsics.width for sensor in recipe_rig(recipe).sensors}
     shown: list[float] = []

@@ -19,7 +19,7 @@ Picture = NDArray[np.uint8]
 INK = (30, 32, 36)
 PAPER = (250, 250, 248)
 SIZE = 640
-"""Pixels of what stands for a picture, where nobody says."""
+"""Default size of a stand-in for a picture, pixels."""
 
 GAP = 4
 """Pixels between the sensors of an instant."""
@@ -29,7 +29,7 @@ Extents = Mapping[str, Extent]
 
 
 Before = Callable[[Sample], Sequence[Sample]]
-"""Gives what a sample's sensor saw before it."""
+"""Returns the earlier samples of a sample's sensor."""
 
 
 def nothing(sample: Sample) -> Sequence[Sample]:
@@ -38,7 +38,7 @@ def nothing(sample: Sample) -> Sequence[Sample]:
 
 
 def check_drawn(samples: Sequence[Sample], draw: Sequence[str]) -> None:
-    """Raise StoreError for what nobody can draw: names of no drawing, and of what none of the samples has."""
+    """Raise StoreError for names that cannot be drawn: unknown drawings, and labels that none of the samples has."""
     known = {drawing.name: source for source, drawing in drawable().items()}
     for name in draw:
         if name not in known:
@@ -51,7 +51,7 @@ def check_drawn(samples: Sequence[Sample], draw: Sequence[str]) -> None:
 
 
 def drawn(sample: Sample, draw: Sequence[str]) -> list[Drawing]:
-    """The chosen drawings of what a sample has."""
+    """The chosen drawings that a sample has the labels for."""
     return [drawing for source, drawing in drawable().items() if drawing.name in draw and is_in(source, sample)]
 
 
@@ -73,10 +73,10 @@ def draw_sample(
     within: Extents | None = None,
 ) -> Picture:
     """One frame with labels as they are drawn (`labels.drawings`): masks, 3D boxes (front face filled), 2D boxes and tracks
-    over the picture, depth and flow beside it; (H, W, 3) uint8 sRGB. What the sample does not have is not drawn; without a
-    picture what stands for it is (a LiDAR's points from above).
+    over the picture, depth and flow beside it; (H, W, 3) uint8 sRGB. Labels that the sample lacks are not drawn; a stand-in
+    replaces a missing picture (a LiDAR's points from above).
 
-    `before` gives what its sensor saw before it, for trails; `within`: what pictures beside it tell apart.
+    `before` returns its sensor's earlier samples, for trails; `within` has the value ranges of the pictures beside it.
     """
     return np.hstack(_pictures(sample, draw, width, before, within or {}))
 
@@ -92,14 +92,14 @@ def draw_instant(samples: Sequence[Sample], draw: Sequence[str], width: int | No
 
 
 def _padded(picture: Picture, height: int, left: int) -> Picture:
-    """The picture on paper, so high, with a margin at its left."""
+    """The picture on paper of this height, with a margin at its left."""
     out = np.full((height, left + picture.shape[1], 3), PAPER, np.uint8)
     out[: picture.shape[0], left:] = picture
     return out
 
 
 def _pictures(sample: Sample, draw: Sequence[str], width: int | None, before: Before, within: Extents) -> list[Picture]:
-    """The picture, and what is drawn beside it, all of one size."""
+    """The picture, and the drawings beside it, all of one size."""
     chosen = drawn(sample, draw)
     if picture_of(sample.channels) is None:
         if (stand_in := stand_in_for(sample.channels)) is not None:

@@ -20,13 +20,13 @@ from viewsphere.store import Dataset
 from viewsphere.validation.errors import shown
 
 WIDTH = 480
-"""Pixels across, at most, of a sample's picture."""
+"""Maximum width of a sample's picture, pixels."""
 
 SAMPLES = 8
-"""Samples of a data set that are shown."""
+"""Number of a data set's samples that are shown."""
 
 OBJECTS = 12
-"""Objects of a sample that are listed."""
+"""Number of a sample's objects that are listed."""
 
 DRAWN = ("masks", "boxes", "boxes3d")
 
@@ -97,11 +97,11 @@ def _object(seen: ObjectAnnotation) -> str:
 
 
 def _picture(picture: Picture) -> str:
-    """A picture inside of the page."""
+    """A picture embedded in the page."""
     return f'<div><img alt="" src="data:image/png;base64,{b64encode(encode_png(picture)).decode()}"></div>'
 
 
 def _table(facts: Iterable[tuple[str, str]]) -> str:
-    """Names and what they are, in two columns."""
+    """Names and values, in two columns."""
     rows: Sequence[str] = [f"<tr><th>{escape(name)}</th><td>{escape(value)}</td></tr>" for name, value in facts]
     return f"<table>{''.join(rows)}</table>"

@@ -31,7 +31,7 @@ from viewsphere.store.index import Ranges, length, nth, numbers
 from viewsphere.store.samples.films import Film
 
 ROW = 4
-"""Instants of a sequence that a preview shows, where there are several sequences."""
+"""Number of instants of a sequence that a preview shows if there are several sequences."""
 
 
 def preview_samples(
@@ -54,7 +54,7 @@ def preview_samples(
 
 
 def _instants(recipe: Recipe, count: int, width: int, draw: Sequence[str], row: int) -> Iterator[Sample]:
-    """The labels that nobody draws are not computed: they compare instants, of which a preview shows few."""
+    """Samples of sequences. Labels that are not drawn are not computed, because they compare instants that a preview lacks."""
     pictures = [name for name in recipe.channels if name == picture_of(recipe.channels)]
     planned = prepare(_drawable(recipe, pictures or ["rgb"], draw))
     stages, instants = Stages(), recipe.time.count if recipe.time else 1
@@ -68,7 +68,7 @@ def _instants(recipe: Recipe, count: int, width: int, draw: Sequence[str], row: 
 
 
 def _check(stages: Stages, planned: Plan, subjects: Sequence[str]) -> None:
-    """Read the models of what is shown, and see that no camera stands in them; raises the mistakes in all of them together."""
+    """Read the shown models and check that no camera is inside them; raises all their errors together."""
     specs = {spec.key: spec for subject in subjects for spec in planned.cast(subject)}
 
     def read(spec: ModelSpec) -> None:
@@ -93,7 +93,7 @@ def _rendered(stages: Stages, planned: Plan, subject: str, poses: Sequence[int],
 
 
 def _drawable(recipe: Recipe, channels: Sequence[str], draw: Sequence[str]) -> Recipe:
-    """The recipe with these channels, and with what is drawn, and without annotations that nobody draws."""
+    """The recipe with these channels and the drawn labels, without annotations that are not drawn."""
     wanted = [source for source, drawing in drawable().items() if drawing.name in draw]
     seen = tuple(dict.fromkeys((*channels, *(source for source in wanted if source in known()))))
     asked = tuple(source for source in wanted if source in on_request())
@@ -103,7 +103,7 @@ def _drawable(recipe: Recipe, channels: Sequence[str], draw: Sequence[str]) -> R
 
 
 def _keeping(rig: SensorList, channels: Sequence[str]) -> SensorList:
-    """The rig, whose sensors keep what is left of their channels."""
+    """The rig, with each sensor's channels reduced to these."""
     sensors = {
         name: entry.model_copy(update={"channels": tuple(c for c in entry.channels or () if c in channels) or None})
         for name, entry in rig.sensors.items()
@@ -121,7 +121,7 @@ def dataset_samples(dataset: Dataset, count: int = 12, row: int = ROW, films: Se
         return [dataset[place] for film in chosen for i in film.spread(_each(count, rows, row)) for place in film.places[i]]
     picks = np.unique(np.linspace(0, len(dataset) - 1, min(count, len(dataset))).round().astype(int))
     samples = [dataset[int(i)] for i in picks]
-    return [sample for sample in samples if is_shown(sample.files)] or samples  # some sensors may keep labels alone
+    return [sample for sample in samples if is_shown(sample.files)] or samples  # some sensors may keep only labels
 
 
 def _spread(planned: Plan, count: int) -> list[tuple[str, list[list[int]]]]:
@@ -165,7 +165,7 @@ def _scaled(shot: Shot, width: int) -> dict[str, Any]:
 
 
 def _nearer(tracks: Tracks, share: float) -> Tracks:
-    """The same points in pictures that are smaller by this share."""
+    """The same points in pictures that are scaled by this share."""
     points = tuple((instant, x * share, y * share) for instant, x, y in tracks.points)
     return tracks.model_copy(update={"points": points, "grid": tracks.grid and max(1, round(tracks.grid * share))})
 

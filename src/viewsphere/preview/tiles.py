@@ -47,7 +47,7 @@ def contact_sheet(
 
 
 def _strip(samples: Sequence[Sample], film: Film, draw: Sequence[str], width: int, before: Before) -> list[Tile]:
-    """One sequence; pictures beside have one meaning of colours in all of it."""
+    """One sequence; the pictures beside it share one meaning of colours."""
     film_samples = [samples[place] for places in film.places for place in places]
     within, most = extents(film_samples, draw), max(120, width + 80 - 80 * len(film.sensors))
     return [
@@ -93,7 +93,7 @@ def tiled(*strips: Sequence[Tile], columns: int) -> Picture:
 
 
 def with_key(sheet: Picture, draw: Sequence[str]) -> Picture:
-    """The sheet, with what the colours of the drawings mean below it, where they have a meaning."""
+    """The sheet, with the key of the drawings' colours below it, if they have one."""
     entries = [entry for drawing in drawings() if drawing.name in draw for entry in drawing.key]
     font = ImageFont.load_default(size=12)
     lines = _lines(entries, font, sheet.shape[1] - 2 * MARGIN)
@@ -130,7 +130,7 @@ def _lines(entries: Sequence[Entry], font: ImageFont.ImageFont | ImageFont.FreeT
 
 
 def fitting(text: str, font: ImageFont.ImageFont | ImageFont.FreeTypeFont, width: int) -> str:
-    """The text, or as much of it as a width has room for."""
+    """The text, shortened to fit a width."""
     while len(text) > 2 and font.getlength(text) > width:
         text = text[:-2] + "…"
     return text

@@ -20,13 +20,13 @@ from viewsphere.store.samples.films import Earlier, Film, film_named, films_of
 from viewsphere.store.shots.moving import move
 
 PROBES = 12
-"""Instants of a sequence that say which values all of its pictures tell apart."""
+"""Number of a sequence's instants that determine the value range of all its pictures."""
 
 WIDEST = 3840
 """Pixels; wider instants are shrunk."""
 
 MOST_BYTES = 2_000_000_000
-"""Of all pictures of an animated WebP, which are in memory together."""
+"""Maximum bytes of all pictures of an animated WebP, which are in memory together."""
 
 Listener = Callable[[int, int], None]
 
@@ -70,7 +70,7 @@ def write_video(
 
 @dataclass(frozen=True)
 class _Atomic:
-    """A file that is there when it is whole, and not at all before."""
+    """A file that appears only when it is complete."""
 
     file: Path
 
@@ -107,7 +107,7 @@ def _first(samples: Sequence[Sample], film: Film, draw: Sequence[str]) -> tuple[
 
 
 def _size(sizes: Sequence[tuple[int, int]]) -> tuple[int, int]:
-    """Even width and height, as encoders want them, with room for all."""
+    """Even width and height, as encoders need, with room for all sizes."""
     width, height = (max(size[i] for size in sizes) for i in (0, 1))
     return width + width % 2, height + height % 2
 
@@ -123,7 +123,7 @@ def _pictures(samples: Sequence[Sample], films: Sequence[Film], draw: Sequence[s
 
 
 def _page(picture: Picture, size: tuple[int, int], caption: str, draw: Sequence[str]) -> Picture:
-    """The picture at the top of a page, with its caption and what colours mean below."""
+    """The picture at the top of a page, with its caption and the key of colours below."""
     page = Image.new("RGB", (size[0], size[1] + CAPTION), PAPER)
     shown = Image.fromarray(picture)
     if shown.width > size[0]:

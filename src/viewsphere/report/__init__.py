@@ -1,4 +1,4 @@
-"""A data set as one HTML page to look at: pictures with their labels, viewpoints, distributions, models and proofs."""
+"""The report on a data set, one HTML page: pictures with their labels, viewpoints, distributions, models and proofs."""
 
 from __future__ import annotations
 
@@ -32,18 +32,18 @@ GOLDEN = (5**0.5 - 1) / 2
 
 
 LIMIT = 20_000_000
-"""Bytes that the page may have at most."""
+"""Maximum size of the page, bytes."""
 
 MODELS = 48
-"""Models that are shown with a mesh, at most."""
+"""Maximum number of models shown with a mesh."""
 
 TRIANGLES = 240_000
-"""Triangles of all meshes together, and of one mesh, at most."""
+"""Maximum number of triangles, of all meshes together and of one mesh."""
 
 MOST_TRIANGLES = 14_000
 
 CAMERAS = 600
-"""Cameras that are shown around a model, at most."""
+"""Maximum number of cameras shown around a model."""
 
 Listener = Callable[[str, int, int], None]
 
@@ -98,7 +98,7 @@ def write_report(
 
 
 def _positions(films: Sequence[Film], table: FrameTable, frames: int) -> list[int]:
-    """Positions of the shown frames, ascending: those of the films that are played, and others where these leave room."""
+    """Positions of the shown frames, ascending: the frames of played films, and other frames if there is room."""
     places_of_films = {place for film in films for places in film.places for place in places}
     if not places_of_films:
         return chosen_frames(table, frames)
@@ -130,7 +130,7 @@ def conventions() -> dict[str, Any]:
 
 
 def _models(dataset: Dataset, table: FrameTable, tell: Listener) -> list[dict[str, Any]]:
-    """Meshes of models spread over the data set, with the cameras that saw them, or why there is none."""
+    """Meshes of models spread over the data set, with the cameras that saw them, or the reason why there is no mesh."""
     chosen = [dataset.models[i] for i in spread(len(dataset.models), MODELS)]
     most = min(MOST_TRIANGLES, TRIANGLES // max(1, len(chosen)))
     models: list[dict[str, Any]] = []
@@ -141,7 +141,8 @@ def _models(dataset: Dataset, table: FrameTable, tell: Listener) -> list[dict[st
 
 
 def model_data(dataset: Dataset, info: ModelInfo, table: FrameTable, most: int = MOST_TRIANGLES) -> dict[str, Any]:
-    """A model's mesh of at most so many triangles, or why there is none, and the cameras that saw it, as plain data."""
+    """A model's mesh of at most `most` triangles, or the reason why there is none, and the cameras that saw it, as plain data.
+    """
     try:
         with here(dataset.path(info.glb)) as file:
             shape = {"mesh": mesh_data(read_small(file, most, info.node)), "problem": None}
@@ -164,7 +165,7 @@ def _cameras(info: ModelInfo, table: FrameTable) -> dict[str, Any]:
 
 
 def _unheard(phase: str, done: int, total: int) -> None:
-    """The listener of callers who gave none."""
+    """The default listener, which does nothing."""
 
 
 __all__ = ["Proof", "conventions", "model_data", "report_data", "script_json", "write_report"]

@@ -12,10 +12,10 @@ WIDTHS = (30.0, 24.0, 22.5, 20.0, 18.0, 15.0, 12.0, 10.0, 9.0, 7.5, 6.0, 5.0)
 """Widths that a cell may have, degrees; each divides a full turn."""
 
 FREE = 10.0
-"""Width for viewpoints that lie on no grid."""
+"""Cell width for viewpoints that are not on a grid, degrees."""
 
 PER_DEGREE = 2
-"""Steps in a degree to which viewpoints are rounded before a grid is looked for."""
+"""Steps per degree to which viewpoints are rounded before the search for a grid."""
 
 
 @dataclass(frozen=True)

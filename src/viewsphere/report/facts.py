@@ -20,8 +20,8 @@ PAUSE = 600.0
 class Timing:
     """The times at which frames were finished, from the times of their files.
 
-    first and last are in ISO 8601 (UTC). seconds: of work between these two, without breaks; frames: finished in these seconds;
-    runs: their number.
+    `first` and `last` are in ISO 8601 (UTC). `seconds` is the working time between them, without breaks; `frames` were finished
+    in this time; `runs` is the number of runs.
     """
 
     first: str

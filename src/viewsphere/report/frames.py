@@ -1,4 +1,4 @@
-"""A shown frame's numbers as plain data: what the page draws over its picture and writes beside it."""
+"""A shown frame's numbers as plain data, which the page draws over its picture and lists beside it."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ from viewsphere.report.unknown import number, numbers
 
 
 def frame_data(sample: Sample) -> dict[str, Any]:
-    """Frame index, split, picture's path and size, pose, camera and objects, of a sequence also its moment; unknown values are
-    null. Of a LiDAR, which has no picture, `scan` are its rings and columns, and the size is that of what stands for one.
+    """Frame index, split, picture's path and size, pose, camera and objects, and, in a sequence, its moment; unknown values are
+    null. For a LiDAR, which has no picture, `scan` has its rings and columns, and the size is that of the stand-in.
     """
     pose, camera, stands_in = sample.known_pose, sample.known_camera, stand_in_for(sample.channels) is not None
     return {

@@ -1,4 +1,4 @@
-"""The page: one HTML file that holds its style, scripts, libraries, pictures and numbers, and asks nothing of a network."""
+"""The page: one HTML file that holds its style, scripts, libraries, pictures and numbers, and needs no network."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ VENDOR = WEB / "vendor" / "vendor.min.js"
 
 
 def page(title: str, data: Mapping[str, Any]) -> str:
-    """The whole HTML text of a page that is a file."""
+    """The complete HTML text of a page in a file."""
     parts = {
         "server": "'none'",
         "pictures": "",
@@ -33,10 +33,10 @@ def page(title: str, data: Mapping[str, Any]) -> str:
 
 
 def served_page(title: str, data: Mapping[str, Any], own: Path, vendor: str) -> str:
-    """The whole HTML text of a page that asks its server for more than the data.
+    """The complete HTML text of a page that loads more data from its server.
 
-    `own` is a folder with a style and modules of that page: they are called `own/<file>`, and its `main.js` begins. The
-    libraries are the module `own/vendor.js`, which is asked for at the path `vendor` when it is needed. No script runs but
+    `own` is a folder with a style and modules of that page: they are called `own/<file>`, and its `main.js` starts the page.
+    The libraries are the module `own/vendor.js`, which is loaded from the path `vendor` when it is needed. No script runs but
     those of this text and what they import.
     """
     nonce = secrets.token_urlsafe(16)

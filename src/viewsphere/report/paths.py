@@ -1,4 +1,4 @@
-"""A page is shown to others: it names files, not where on somebody's machine they are."""
+"""The removal of folders from a page: other people see the page, so it names files without their location on a machine."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ KINDS: tuple[type[PurePath], ...] = (PurePosixPath, PureWindowsPath)
 
 
 def without_folders(value: Any) -> Any:
-    """Plain data whose texts have no absolute path: of each only the last name is left. Where a path ends in a text is guessed,
-    so a folder whose name has a space may be left.
+    """Plain data with each absolute path in its texts reduced to the last name. The end of a path in a text is a guess, so a
+    folder with a space in its name may remain.
     """
     return _changed(value, lambda text: FOLDERS.sub("", text))
 
 
 def only_names(value: Any) -> Any:
-    """Plain data, such as a recipe, whose texts that are absolute paths from end to end are their last names."""
+    """Plain data, such as a recipe, with texts that are entirely an absolute path reduced to the last name."""
     return _changed(value, _name)
 
 

@@ -80,7 +80,7 @@ THREADS = 4
 Layers = dict[str, Any]
 
 Within = Mapping[str, Mapping[str, Extent]]
-"""Of sequences, by their names: of layers, by theirs, what their pictures tell apart."""
+"""The value ranges of layers, by the names of sequences and layers."""
 
 
 def layers_within(
@@ -90,11 +90,11 @@ def layers_within(
     progress: Callable[[int], None] | None = None,
     within: Within | None = None,
 ) -> list[Layers]:
-    """The layers of the samples at these positions, as large as fit together into `budget` bytes of text.
+    """The layers of the samples at these positions, at the largest scale that fits into `budget` bytes of text.
 
-    `within`: what layers of a sequence tell apart, by its name. Only one sample is in memory at a time, since its arrays are
-    many times larger than its pictures. The scale is tried on a few frames first. Raises UserError if the smallest scale does
-    not fit.
+    `within` has the value ranges of each sequence's layers, by its name. Only one sample is in memory at a time, since its
+    arrays are many times larger than its pictures. The scale is tried on a few frames first. Raises UserError if the smallest
+    scale does not fit.
     """
     probes = [positions[i] for i in np.unique(np.linspace(0, len(positions) - 1, PROBES).astype(int))] if positions else []
     for scale in SCALES:
@@ -147,7 +147,7 @@ def layers(sample: Sample, scale: Scale, within: Mapping[str, Extent] | None = N
 
 @dataclass(frozen=True)
 class Layer:
-    """A small picture as lossy WebP, and the numbers that its colours tell apart, if any."""
+    """A small picture as lossy WebP, and the value range of its colours, if any."""
 
     webp: bytes
     range: tuple[float, float] | None = None
@@ -179,21 +179,21 @@ def _rgb(sample: Sample, scale: Scale, within: Mapping[str, Extent]) -> Layer:
 
 
 SCAN = 640
-"""Width of what stands for the picture of a LiDAR; it is so high, too, below the range image."""
+"""Width of the stand-in for a LiDAR's picture, and its height below the range image."""
 
 LEAST_STRIP = 32
-"""Its range image's height at least."""
+"""Minimum height of its range image."""
 
 NO_RETURN = (16, 18, 24)
 
 
 def scan_size(sample: Sample) -> tuple[int, int]:
-    """Width and height of what stands for a LiDAR's picture: its range image, and below it its points from above."""
+    """Width and height of the stand-in for a LiDAR's picture: its range image, and below it its points from above."""
     return SCAN, SCAN + max(LEAST_STRIP, round(SCAN * sample.height / sample.width))
 
 
 def scan_picture(sample: Sample, scale: Scale) -> Picture:
-    """A LiDAR's range image, a row each ring, near light, above its points from above; (H, W, 3)."""
+    """A LiDAR's range image, with a row for each ring and light near points, and below it a map of its points; (H, W, 3)."""
     paint = stand_in_for(sample.channels)
     assert paint is not None
     width, height = (round(side * min(1.0, scale.width / SCAN)) for side in scan_size(sample))
@@ -297,7 +297,7 @@ PAINTERS: dict[str, Painter] = {
 
 
 def _widened(lines: NDArray[np.bool_], width: int) -> NDArray[np.bool_]:
-    """Lines in a picture that is at most so wide: no pixel of them gets lost."""
+    """Lines for a picture of at most this width, thickened so that no pixel of them gets lost."""
     if lines.shape[1] <= width:
         return lines
     size = (width, max(1, round(lines.shape[0] * width / lines.shape[1])))
@@ -347,7 +347,7 @@ def coordinate_colors(
 
 
 def part_colors(parts: NDArray[np.int32]) -> Picture:
-    """A colour a part id, (H, W, 4); neighbouring ids differ."""
+    """A colour for each part id, (H, W, 4); neighbouring ids differ."""
     return _rgba(PART_COLORS[(parts - 1) % len(PART_COLORS)], parts > 0)
 
 

@@ -1,4 +1,4 @@
-"""Sequences for the page: which of their instants it plays, and the points and places of each."""
+"""Sequences for the page: the played instants, with the points and positions in each."""
 
 from __future__ import annotations
 
@@ -16,16 +16,16 @@ from viewsphere.report.unknown import number, numbers
 from viewsphere.store.samples.films import Film
 
 MOST_INSTANTS = 60
-"""Of a sequence that is played, evenly spaced."""
+"""Maximum number of a played sequence's instants, evenly spaced."""
 
 MOST_POINTS = 400
-"""Of a picture's tracks that are shown, evenly spread."""
+"""Maximum number of a picture's shown tracks, evenly spread."""
 
 PROBES = 8
-"""Instants that say which values a sequence's pictures tell apart."""
+"""Number of instants that determine the value range of a sequence's pictures."""
 
 SCALED = ("flow", "disparity")
-"""Layers whose colours mean the same all through a sequence."""
+"""Layers whose colours have the same meaning throughout a sequence."""
 
 Extents = dict[str, Extent]
 
@@ -83,7 +83,7 @@ def extents_of(samples: Sequence[Sample], film: Film) -> Extents:
 
 
 def moment_data(sample: Sample) -> dict[str, Any]:
-    """The place of a sample in its sequence, and where its camera, its objects and its points are; nothing of a still one."""
+    """The place of a sample in its sequence, and the positions of its camera, objects and points; empty for a still picture."""
     if not sample.sequence:
         return {}
     return {

@@ -17,10 +17,10 @@ from viewsphere.report.unknown import number, numbers
 from viewsphere.store import Dataset
 
 BINS = 24
-"""Bins that a histogram has, about."""
+"""Approximate number of bins in a histogram."""
 
 HUES = 6
-"""Categories with a colour of their own; all others share a grey."""
+"""Number of categories with their own colour; all others share a grey."""
 
 UNNAMED = "unknown"
 

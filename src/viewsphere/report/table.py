@@ -1,4 +1,4 @@
-"""Every frame and object of a data set as columns of numbers: what a report counts, some 40 bytes an object."""
+"""Every frame and object of a data set as columns of numbers for a report's counts, about 40 bytes per object."""
 
 from __future__ import annotations
 
@@ -84,7 +84,7 @@ class Names:
         return tuple(self.codes)
 
     def code(self, name: str) -> int:
-        """The number of a name, a new one for a name that was not met before."""
+        """The number of a name; a new name gets a new number."""
         return self.codes.setdefault(name, len(self.codes))
 
     def translation(self, names: Iterable[str]) -> NDArray[np.int32]:
@@ -93,7 +93,7 @@ class Names:
 
 
 class Rows:
-    """Rows of one kind that only become more; the array of those that are there does not change when others come."""
+    """A growing array of rows of one kind; existing rows do not change when others are added."""
 
     def __init__(self, kind: np.dtype[Any]) -> None:
         self._held = np.zeros(1024, kind)
@@ -105,7 +105,7 @@ class Rows:
         return self._held[: self._count]
 
     def extend(self, rows: NDArray[Any]) -> None:
-        """Put rows behind the others; the room for them doubles when it is used up."""
+        """Append rows; the capacity doubles when it is used up."""
         count = self._count + len(rows)
         if count > len(self._held):
             held = np.zeros(max(count, 2 * len(self._held)), self._held.dtype)
@@ -116,7 +116,7 @@ class Rows:
 
 
 class Columns:
-    """A table that becomes longer: tables one behind the other, with one numbering of names."""
+    """A growing table: tables one after another, with one numbering of names."""
 
     def __init__(self) -> None:
         self._frames, self._objects = Rows(FRAME), Rows(OBJECT)
@@ -129,7 +129,7 @@ class Columns:
         return FrameTable(self._frames.array, self._objects.array, *names)
 
     def extend(self, table: FrameTable) -> None:
-        """Put the rows of a table behind the others."""
+        """Append the rows of a table."""
         frames, objects = table.frames.copy(), table.objects.copy()
         for column, names, own in (("split", self._splits, table.splits), ("subject", self._subjects, table.subjects)):
             frames[column] = names.translation(own)[frames[column]] if len(frames) else 0

@@ -1,4 +1,4 @@
-"""Numbers as JSON takes them, null for unknown ones."""
+"""Numbers for JSON, with null for unknown ones."""
 
 from __future__ import annotations
 

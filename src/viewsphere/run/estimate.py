@@ -1,11 +1,11 @@
-"""The estimated cost of a recipe's data set, measured on a few of its frames in a temporary folder.
+"""An estimate of the cost of a recipe's data set, measured on a few of its frames in a temporary folder.
 
     seconds = (models x model + scenes x scene + frames x frame) / workers + frames x export
     bytes   = models x model + frames x frame
 
-A scene is built once for each model or random scene (by every worker, if there are fewer). Where the recipe draws a scene for
-each frame, it is built for each frame. Exports are written by one process. Not counted: starting the workers, and compiling
-kernels.
+A scene is built once for each model or random scene (by every worker, if there are fewer). If the recipe draws a scene for
+each frame, the scene is built for each frame. Exports are written by one process. Not counted: starting the workers, and
+compiling kernels.
 """
 
 from __future__ import annotations
@@ -34,27 +34,27 @@ from viewsphere.scratch import temporary
 from viewsphere.store import Dataset, Row, Store
 
 REFERENCE_MS = 63.0
-"""CPU milliseconds of a frame on the machine of docs/performance.md, an AMD EPYC, idle: the upper of five calls, 59 to 63,
-2026-11.
+"""CPU milliseconds of a frame on the idle machine of docs/performance.md, an AMD EPYC: the largest of five measurements, 59 to
+63, in 2026-11.
 """
 
 SPEED_S = 1.0
-"""Seconds after which no frame is begun: beside imports and the first frame, the command stays below three."""
+"""Seconds after which no frame is started. With imports and the first frame, the command then takes less than three."""
 
 
 SUBJECTS = 3
 SHOTS_OF_EACH = 4
 SHOT_FRAMES = 2
 BLOCK = 4096
-"""Bytes that a file system gives out at once, on most."""
+"""Allocation unit of most file systems, bytes."""
 
 GOLDEN = 0.6180339887498949
 
 
 @dataclass(frozen=True)
 class Rates:
-    """Seconds of one process and bytes on disk: for a model (each time step of one that deforms), a scene, a frame, the exports
-    of a frame; channels that take much of them, and that no format uses.
+    """Seconds of one process and bytes on disk for a model (or each time step of a deforming model), a scene, a frame, and the
+    exports of a frame. Also the channels that no format uses but that take much of the bytes.
     """
 
     model: float
@@ -68,8 +68,8 @@ class Rates:
 
 @dataclass(frozen=True)
 class Estimate:
-    """Seconds and bytes that rendering a recipe into an empty folder takes with so many worker processes, and channels that
-    take much of the bytes, and that no format uses.
+    """Seconds and bytes for rendering a recipe into an empty folder with a number of worker processes. Also the channels that
+    no format uses but that take much of the bytes.
     """
 
     seconds: float
@@ -81,13 +81,13 @@ class Estimate:
 def estimate(recipe: Recipe, workers: int = 1, clock: Callable[[], float] = time.perf_counter) -> Estimate:
     """Time and disk space for a whole data set, from at most 24 frames of three of its models or scenes, spread over the poses.
 
-    Takes some seconds. Raises UserError for what `generate` would also refuse: a model that cannot be used, for one.
+    Takes a few seconds. Raises UserError for everything that `generate` would also refuse, such as an unusable model.
     """
     return extrapolate(prepare(recipe), measure(recipe, clock), workers)
 
 
 def extrapolate(planned: Plan, rates: Rates, workers: int) -> Estimate:
-    """The cost of a whole plan; no workers count as one, for then the calling process works."""
+    """The cost of a whole plan; 0 workers count as one, because the calling process then does the work."""
     crew, models = max(workers, 1), sum(max(1, len(planned.steps_of(spec))) for spec in planned.kept_specs)
     scenes = len(planned.taken)
     scenes = planned.frames if planned.recipe.is_new_each_frame else max(scenes, min(crew, planned.shot_count))
@@ -97,7 +97,7 @@ def extrapolate(planned: Plan, rates: Rates, workers: int) -> Estimate:
 
 
 def measure(recipe: Recipe, clock: Callable[[], float] = time.perf_counter) -> Rates:
-    """Make a few frames as a run would, exports included, in a temporary folder; `clock` gives seconds."""
+    """Make a few frames as a run would, including exports, in a temporary folder; `clock` returns seconds."""
     planned = prepare(recipe.model_copy(update={"shot_frames": SHOT_FRAMES}))
     with temporary("estimate") as folder, recipe.located():
         return _measure_in(planned, Store(folder / "out"), _Stopwatch(clock))
@@ -111,7 +111,7 @@ def _measure_in(planned: Plan, store: Store, stopwatch: _Stopwatch) -> Rates:
     shown = [(spec, _shown(planned, spec, rows)) for spec in specs]
     made = sum(max(1, len(steps)) for _, steps in shown)
     model = stopwatch.mean([_model_work(store, portion, *one) for one in shown]) * len(shown) / made
-    worker = Worker(store.root, portion)  # one that did not make the models: in a run that is seldom the one that renders them
+    worker = Worker(store.root, portion)  # a new one: in a run, the worker that renders models has seldom made them
     shots = [worker.composer.shot(row) for row in rows]
     load_kernels(shots[0])
     begun = frame = 0.0
@@ -121,7 +121,7 @@ def _measure_in(planned: Plan, store: Store, stopwatch: _Stopwatch) -> Rates:
     frames = sum(len(shot.instants) * len(shot.rig.sensors) for shot in shots)
     frame /= frames
     scenes = len({shot.stage_key for shot in shots})
-    scene = max(begun - len(shots) * frame, 0.0) / scenes  # what a first frame takes beyond others
+    scene = max(begun - len(shots) * frame, 0.0) / scenes  # additional time of a first frame
     export = _export(store, planned.recipe.formats, stopwatch)
     model_bytes = disk_bytes([store.folder / "models"])
     outputs = [store.folder / "models", store.folder / "shots", *(store.root / entry.name for entry in planned.recipe.formats)]
@@ -131,7 +131,7 @@ def _measure_in(planned: Plan, store: Store, stopwatch: _Stopwatch) -> Rates:
 
 
 def _shown(planned: Plan, spec: ModelSpec, rows: Sequence[Row]) -> tuple[TimeStep, ...]:
-    """The time steps of a model that shots show."""
+    """The time steps of a model in the shots."""
     steps, moments = planned.steps_of(spec), (planned.pose_list[row.positions[0][0]].time for row in rows)
     shown = {moment.frame for moment in moments if moment is not None}
     return tuple(step for step in steps if step.frame in shown) or steps
@@ -142,7 +142,7 @@ def _model_work(store: Store, portion: DatasetPart, spec: ModelSpec, steps: Sequ
 
 
 def _export(store: Store, formats: Sequence[FormatEntry], stopwatch: _Stopwatch) -> float:
-    """Write the formats; gives the seconds, less those for looking through the whole plan for frames."""
+    """Write the formats; returns the seconds without those for searching the whole plan for frames."""
     dataset = Dataset(store.root)
     assert len(dataset) > 0
     written = [(entry, store.root / entry.name) for entry in formats]
@@ -152,7 +152,7 @@ def _export(store: Store, formats: Sequence[FormatEntry], stopwatch: _Stopwatch)
 
 
 def _spread(planned: Plan) -> Iterator[Row]:
-    """Some shots of subjects evenly over the plan: together evenly over the poses."""
+    """Some shots of subjects spread evenly over the plan; together they are spread evenly over the poses."""
     count = min(SUBJECTS, len(planned.taken))
     for i in range(count):
         subject = planned.taken[i * (len(planned.taken) - 1) // max(count - 1, 1)]
@@ -173,7 +173,7 @@ def _stats(folders: Sequence[Path]) -> Iterator[os.stat_result]:
 
 @dataclass(frozen=True)
 class _Stopwatch:
-    """Seconds that something takes."""
+    """Measures seconds."""
 
     clock: Callable[[], float]
 
@@ -188,7 +188,7 @@ class _Stopwatch:
 
 @dataclass(frozen=True)
 class Speed:
-    """CPU milliseconds of a frame, and how many times as many frames this machine makes as the reference."""
+    """CPU milliseconds of a frame, and the speed of this machine relative to the reference."""
 
     frame_ms: float
     relative: float
@@ -202,7 +202,7 @@ def speed_recipe() -> Recipe:
 
 
 def measure_speed() -> Speed | None:
-    """The median over some frames, without the first; None where kernels would have to be compiled."""
+    """The median over some frames without the first one; None if kernels would have to be compiled."""
     recipe = speed_recipe()
     if not is_precompiled(sketched(recipe)):
         return None

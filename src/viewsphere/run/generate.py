@@ -1,4 +1,4 @@
-"""A recipe becomes a data set on disk: plan minus store, then the exports."""
+"""The rendering of a recipe into a data set on disk: first the frames that the store lacks, then the exports."""
 
 from __future__ import annotations
 
@@ -36,7 +36,9 @@ from viewsphere.store.shots.heartbeat import HeartbeatWriter
 
 @dataclass(frozen=True)
 class Warnings:
-    """The warnings of a run, as lines: `models` by models' keys, and `files`, of which models are parts, by file names."""
+    """The warnings of a run, as lines: `models` by models' keys, and `files` by file names, for files that contain several
+    models.
+    """
 
     models: dict[str, tuple[str, ...]] = field(default_factory=dict[str, tuple[str, ...]])
     files: dict[str, tuple[str, ...]] = field(default_factory=dict[str, tuple[str, ...]])
@@ -71,24 +73,24 @@ def generate(
     ray: str | None = None,
     listener: Listener | None = None,
 ) -> Summary:
-    """Render all frames of a recipe (or of the one in this file) that `out` does not hold yet, then write the formats (default:
-    the recipe's), by name or as {name: {option: value}}; options that are not said are the recipe's.
+    """Render all frames of a recipe (or recipe file) that `out` lacks, then write the formats (default: the recipe's). A
+    format is its name, or {name: {option: value}}; missing options come from the recipe.
 
-    With `append`, `out` is a finished data set, and models, poses and channels of the recipe that it lacks are added to it;
-    what was there stays as it was.
+    With `append`, `out` is a finished data set, to which the recipe's additional models, poses and channels are added;
+    existing frames do not change.
 
     `shard` (k, n) renders the k-th of n fixed shares of the shots, counted from 0: runs of all shards, on any machines that see
     `out`, in any order, several at once, together render everything. The run after which nothing is missing writes the
     formats; others write none.
 
-    `workers` 0 renders in the calling process; more need a `__main__` guard in the calling script. None starts one a core, and
-    none where one shot or less than three seconds of work are left. `ray` is the address of a Ray cluster whose CPUs render
-    instead, such as "auto" (the one that this machine is of), "host:6379" or "ray://host:10001": at most `workers` of them, 0
-    or None for all; `out` is where all its machines see it.
+    `workers` 0 renders in the calling process; more need a `__main__` guard in the calling script. None starts one worker per
+    core, but none if one shot or less than three seconds of work is left. `ray` is the address of a Ray cluster whose CPUs
+    render instead, such as "auto" (this machine's cluster), "host:6379" or "ray://host:10001". It uses at most `workers` CPUs,
+    or all for 0 or None; all machines of the cluster must see `out`.
 
-    A model that cannot be used is an error before rendering starts; `keep_going` leaves it out and reports it. Raises UserError
-    for the user's mistakes. Raises WorkerDied, when all others are made, for shots that were lost with their workers again and
-    again; `keep_going` leaves them out. Finished frames stay, and the same call goes on from there.
+    An unusable model is an error before rendering starts; `keep_going` leaves it out and reports it. Raises UserError for the
+    user's mistakes. Raises WorkerDied, after all other shots, for shots that were repeatedly lost with their workers;
+    `keep_going` leaves them out. Finished frames stay, and the same call resumes from there.
     """
     begun = time.monotonic()
     own_shard = ALL if shard is None else shard_of(shard)
@@ -145,14 +147,14 @@ def _check_reach(store: Store, workers: int | None) -> None:
 
 
 def _united(wanted: Iterable[FormatEntry], due: Iterable[FormatEntry]) -> tuple[FormatEntry, ...]:
-    """The formats of both, each once; those that are due have their own options."""
+    """The formats of both arguments, each once; due formats keep their own options."""
     return tuple({entry.name: entry for entry in (*wanted, *due)}.values())
 
 
 def _rendered(
     work: Missing, workers: int | None, ray: str | None, keep_going: bool, tell: Listener, pulse: HeartbeatWriter
 ) -> tuple[int, dict[str, str], tuple[str, ...]]:
-    """Render the part's missing shots, or compare its models where it adds nothing.
+    """Render the part's missing shots, or compare its models if no shot is missing.
 
     Returns the number of frames rendered, the skipped models and shots with their reasons, and notes.
     """
@@ -178,7 +180,7 @@ def _remarks(portion: DatasetPart, dataset: Dataset, wanted: tuple[FormatEntry, 
 
 @contextmanager
 def _at_work(portion: DatasetPart, store: Store) -> Generator[HeartbeatWriter]:
-    """Open the store for a run's portion, and show others that it is at work, and how far."""
+    """Open the store for a run's portion, and publish the run's progress to other processes."""
     if portion.number:
         store.make_ready()
         opened = store.occupied()
@@ -189,9 +191,10 @@ def _at_work(portion: DatasetPart, store: Store) -> Generator[HeartbeatWriter]:
 
 
 def _due(wanted: Sequence[FormatEntry], portion: DatasetPart, has_rendered: bool, store: Store) -> Iterator[FormatEntry]:
-    """The formats that a run writes when nothing is missing: those asked for, and those that lie there and are out of date.
+    """The formats that a run writes when nothing is missing: requested formats, and existing exports that are out of date.
 
-    A run that had nothing to render leaves alone what is written and, unless it is one of a shard, whole.
+    A run that rendered nothing leaves up-to-date exports alone. Unless it renders a shard, it checks first that they are
+    intact.
     """
     dataset, least = Dataset(store.root), portion.plan.recipe.keep_annotations_above
     anew = has_rendered or portion.part.supplies
@@ -200,7 +203,7 @@ def _due(wanted: Sequence[FormatEntry], portion: DatasetPart, has_rendered: bool
 
 
 def _is_done(entry: FormatEntry, dataset: Dataset, least: float | None, proved: bool) -> bool:
-    """True if a format is written as it would be now and, with `proved`, all its files have their digests."""
+    """True if a format's export is up to date and, with `proved`, all its files match their digests."""
     return is_written(entry, dataset, least) and not (proved and any(damaged_files(dataset.root / entry.name)))
 
 
@@ -214,15 +217,15 @@ def _left_to_others(portion: DatasetPart, far: Status) -> str:
 
 
 def _asked(recipe: Recipe, formats: Formats | None) -> tuple[FormatEntry, ...]:
-    """The formats to write with all their options: what is asked for, else what the recipe says, else the formats' defaults."""
+    """The formats to write with all their options: as requested, else from the recipe, else the formats' defaults."""
     known = options_of(recipe.formats)
     entries = recipe.formats if formats is None else read_formats(formats)
     return tuple(entry.over(known.get(entry.name, {})).whole() for entry in entries)
 
 
 def _renew_threshold(store: Store, least: float | None) -> Iterator[str]:
-    """Let the whole data set have the recipe's `keep_annotations_above`; a note where older frames had another. The store is
-    locked.
+    """Apply the recipe's `keep_annotations_above` to the whole data set; yields a note if older frames had another value. The
+    store is locked.
     """
     found = store.plan()
     renewed = found.keeping_above(least)
@@ -233,13 +236,13 @@ def _renew_threshold(store: Store, least: float | None) -> Iterator[str]:
 
 
 def _others(wanted: Iterable[FormatEntry], store: Store) -> tuple[FormatEntry, ...]:
-    """The formats that lie in the data set beside those; they keep the options that they were written with."""
+    """The other formats in the data set's folder, with the options of their exports."""
     known = options_of(wanted)
     return tuple(FormatEntry(name=n) for n in plugins.names("formats") if n not in known and (store.root / n).is_dir())
 
 
 def _warnings(planned: Plan, dataset: Dataset, misses: Mapping[str, tuple[str, ...]] | None = None) -> Warnings:
-    """Warnings about models and files, each once; `misses` are others about models, by their keys."""
+    """Warnings about models and files, each once; `misses` are additional warnings about models, by their keys."""
     source_of = {spec.key: Path(spec.source).name for spec in planned.kept_specs if spec.parts is not None}
     models, files = defaultdict[str, list[str]](list), defaultdict[str, list[str]](list)
     for info in dataset.models:

@@ -1,4 +1,4 @@
-"""A recipe becomes samples in memory, without a disk."""
+"""The rendering of a recipe into samples in memory, without a disk."""
 
 from __future__ import annotations
 
@@ -31,10 +31,10 @@ from viewsphere.validation.quantity import quantity
 
 
 class Frames(Shown, Iterable[Sample]):
-    """A recipe's frames, rendered when they are asked for: what `viewsphere.render` gives.
+    """A recipe's frames, rendered on demand: the result of `viewsphere.render`.
 
-    Each loop over it renders its epochs; the next loop begins with the epoch after them. `next` takes frames one by one,
-    and makes it an iterator, which ends once. PyTorch's DataLoader takes it as an IterableDataset.
+    Each loop over the frames renders `epochs` epochs; the next loop continues with the following epoch. `next` returns frames
+    one by one and turns the object into an iterator, which ends once. PyTorch's DataLoader accepts it as an IterableDataset.
     """
 
     def __init__(self, recipe: Recipe, shard: Shard | None, shuffle: bool, epochs: int | None, redraw: bool) -> None:
@@ -56,7 +56,7 @@ class Frames(Shown, Iterable[Sample]):
         return f"<Frames of {self.plan.recipe.name}: {quantity(self.plan.frames, 'frame')}, {loops}, next epoch {self.epoch}>"
 
     def __len__(self) -> int:
-        """Frames of a loop, of this shard or rank alone; raises TypeError where loops are endless."""
+        """Number of frames in a loop, for this shard or rank only; raises TypeError if loops are endless."""
         if self._epochs is None:
             raise TypeError("frames of epochs=None have no end, and no length")
         units = RenderUnits(self.plan)
@@ -71,13 +71,13 @@ class Frames(Shown, Iterable[Sample]):
         return next(self._taken)
 
     def set_epoch(self, epoch: int) -> None:
-        """Say which epoch the next loop begins with, counted from 0: for loaders that start their workers anew for each epoch,
-        as for PyTorch's DistributedSampler.
+        """Set the epoch with which the next loop begins, counted from 0. Loaders that restart their workers for each epoch need
+        this, like PyTorch's DistributedSampler.
         """
         self.epoch = epoch
 
     def _pass(self) -> Iterator[Sample]:
-        """The frames of one loop that are this process's."""
+        """This process's frames in one loop."""
         shard = (self._shard or shard_of_rank()).parted(shard_of_worker(self))
         epochs = count(self.epoch) if self._epochs is None else range(self.epoch, self.epoch + self._epochs)
         self.epoch += self._epochs or 0
@@ -101,13 +101,13 @@ class Frames(Shown, Iterable[Sample]):
                 yield from self._stages.render(shot)
 
     def _compile_for(self, shot: Shot) -> None:
-        """Compile on all cores the kernels that the first shot calls, with a line on a terminal that counts them."""
+        """Compile the kernels of the first shot on all cores; a terminal shows a line that counts them."""
         if not self._is_compiled:
             precompile(shot, told_to(shown_on_terminal))
             self._is_compiled = True
 
     def _drawn(self, epoch: int) -> Plan:
-        """The plan, whose random choices are drawn anew for each epoch where that is asked for."""
+        """The plan; with `redraw`, its random choices are redrawn for each epoch."""
         if not (self._redraw and epoch):
             return self.plan
         recipe = self.plan.recipe
@@ -121,18 +121,18 @@ def render(
     epochs: int | None = 1,
     redraw: bool = False,
 ) -> Frames:
-    """The frames of a recipe (or of the one in this file), rendered one after another in the process that loops over them;
-    nothing is written.
+    """The frames of a recipe (or recipe file), rendered one after another in the process that loops over them; nothing is
+    written.
 
-    In workers of a PyTorch DataLoader, each renders its share, and all together render every frame once an epoch. `shard`
-    (k, n) renders the k-th of n shares, counted from 0; by default that of this process's rank where `torch.distributed` is
-    initialised, else all. Workers part their rank's or shard's frames.
+    Each worker of a PyTorch DataLoader renders a share; together they render every frame once per epoch. `shard` (k, n) renders
+    the k-th of n shares, counted from 0. By default this is the share of the process's rank if `torch.distributed` is
+    initialised, else all frames. Workers divide the frames of their rank or shard.
 
-    `shuffle` draws an order for each epoch from the recipe's seed; poses are shuffled one by one (all sensors of one
-    together), sequences as a whole. `epochs` is how often a loop renders all frames, None for endless loops. With `redraw`
-    all but the first epoch draw anew what the recipe leaves to chance; models and splits stay.
+    `shuffle` draws an order for each epoch from the recipe's seed. Poses are shuffled one by one (all sensors of a pose
+    together), sequences as a whole. `epochs` is the number of times that a loop renders all frames, None for endless loops.
+    With `redraw`, all epochs but the first redraw the recipe's random values; models and splits stay.
 
-    Raises UserError for the user's mistakes: those of the recipe at once, others as soon as they are met.
+    Raises UserError for the user's mistakes: at once for errors in the recipe, otherwise when they are met.
     """
     if epochs is not None and not (isinstance(epochs, int) and epochs > 0):
         raise UserError(f"epochs: expected a number of 1 or more, or None for endless frames; found {shown(epochs)}")
@@ -166,7 +166,7 @@ class RenderUnits:
         return (self._index[int(number)] for number in rng.permutation(len(self)))
 
     def rows(self, unit: Row) -> Iterator[Row]:
-        """The shots of a unit: a sequence is rendered in the shots that the plan cuts it into."""
+        """The shots of a unit; a sequence has the shots into which the plan cuts it."""
         if self.plan.recipe.time is None:
             yield unit
             return

@@ -15,10 +15,10 @@ from viewsphere.store import Row, Store
 
 @dataclass(frozen=True)
 class Missing:
-    """The shots of a portion that the store lacks, counted out row by row: those that no model left out is in.
+    """The shots of a portion that the store lacks, row by row, without shots of left-out models.
 
-    What is finished is looked for once, with one look at each shot; no rows are made of models of which nothing is missing.
-    `skipped` is what is left out, and why.
+    The store is searched once, with one look at each shot; no rows are made for complete models. `skipped` maps the keys of
+    left-out models and shots to the reasons.
     """
 
     portion: DatasetPart
@@ -27,12 +27,12 @@ class Missing:
 
     @cached_property
     def _finished(self) -> frozenset[str]:
-        """Keys of the shots that were finished when this was first asked."""
+        """Keys of the shots that were finished at the first access."""
         return frozenset(self.store.finished())
 
     @property
     def total(self) -> int:
-        """Frames that the portion has, without those that are left out."""
+        """Number of frames in the portion, without left-out frames."""
         indices = self.portion.indices
         if not self.skipped:
             return sum(index.samples for index in indices)
@@ -59,15 +59,15 @@ class Missing:
 
     @property
     def resumed(self) -> int:
-        """Frames of the portion that are there."""
+        """Number of the portion's finished frames."""
         return self._there[1]
 
     def lines(self) -> Iterable[tuple[str, int]]:
-        """The models of which shots are missing, and how many."""
+        """The models with missing shots, and the number of these shots."""
         return self._left.items()
 
     def jobs(self, line: str) -> Iterator[Job]:
-        """The shots of a model that are to be rendered."""
+        """The shots of a model to render."""
         rows = chain.from_iterable(index.rows_of(line) for index in self.portion.indices)
         return (Job(row.key, line, row) for row in self._lacking(rows))
 
@@ -84,7 +84,7 @@ class Missing:
         return (row for row in self.portion.rows if not self._lacks_model(row))
 
     def _lacks_model(self, row: Row) -> bool:
-        """Return whether a model that was left out is in a shot; a shot that lacks company lands in `skipped`."""
+        """Return whether a shot contains a left-out model; a shot whose other models were left out is added to `skipped`."""
         if not self.skipped:
             return False
         if row.subject in self.skipped:

@@ -1,4 +1,6 @@
-"""Warnings and notes about a finished run: draws that missed the recipe's wishes, and changes of materials without effect."""
+"""Warnings and notes about a finished run: random values that missed the recipe's targets, and changes of materials without
+effect.
+"""
 
 from __future__ import annotations
 
@@ -20,16 +22,16 @@ from viewsphere.run.shots.stages import model_files
 from viewsphere.store import Dataset, Store
 
 MOST_NAMES = 8
-"""Materials that a warning lists."""
+"""Maximum number of materials in a warning."""
 
 MOST_READ = 5_000
-"""Frames whose records are read, some two seconds, where the recipe neither says `wanted` nor `min_visibility`."""
+"""Number of frames whose records are read, in about two seconds, if the recipe sets neither `wanted` nor `min_visibility`."""
 
 
 def left_by_chance(dataset: Dataset, portion: DatasetPart) -> Iterator[str]:
-    """Lines about the frames of a run that are not as its recipe asks, and about scenes that lost objects.
+    """Lines about frames of a run that miss the recipe's targets, and about scenes that lost objects.
 
-    Of a large run whose recipe asks for nothing, shots evenly over all are read.
+    For a large run whose recipe sets no targets, an even selection of shots is read.
     """
     recipe, tally, read = portion.plan.recipe, _Tally(portion), 0
     asks = recipe.wanted is not None or recipe.min_visibility is not None
@@ -73,13 +75,13 @@ class _Tally:
                 self.smaller.add(row.subject)
 
     def _empty(self, samples: Sequence[Sample], sensors: int) -> int:
-        """Pictures of moments at which there are objects, and no sensor sees any."""
+        """Number of pictures at instants with objects that no sensor sees."""
         moments = [samples[i : i + sensors] for i in range(0, len(samples), sensors)]
         there = [sum((sample.objects for sample in moment), ()) for moment in moments]
         return sum(len(m) for m, objects in zip(moments, there, strict=True) if objects and not any(o.area for o in objects))
 
     def lines(self, frames: int) -> Iterator[str]:
-        """The warnings and notes, of so many frames."""
+        """The warnings and notes for this number of frames."""
         best = f"the best of {limits.MAX_REDRAWS} draws each"
         missed = sum(miss > 0 for miss in self.misses)
         if missed:
@@ -108,9 +110,9 @@ class _Tally:
 
 
 def materials_not_found(recipe: Recipe, specs: Sequence[ModelSpec], store: Store) -> dict[str, tuple[str, ...]]:
-    """Warnings by the keys of finished models, for each change that is for them and fits none of their materials.
+    """Warnings by the keys of finished models, for each change that applies to the model but matches none of its materials.
 
-    One for all models (`models: '*'`) that fits some of them is meant so.
+    A change for all models (`models: '*'`) needs to match only some of them.
     """
     warnings: defaultdict[str, tuple[str, ...]] = defaultdict(tuple)
     for i, entry in enumerate(recipe.scene.materials):

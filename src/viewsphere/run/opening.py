@@ -1,4 +1,4 @@
-"""From a recipe and an output folder to the part of the data set that is to be rendered."""
+"""The part of the data set to render, given a recipe and an output folder."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 
 def prepare(recipe: Recipe) -> Plan:
-    """The recipe's plan, once everything is checked that can be before a model is read.
+    """The recipe's plan, after all checks that need no model.
 
     Raises UserError for the user's mistakes: files, names, counts, engine options, background images.
     """
@@ -41,10 +41,10 @@ def prepare(recipe: Recipe) -> Plan:
 
 
 def check_formats(planned: Plan, wanted: Iterable[FormatEntry], channels: Sequence[str]) -> None:
-    """See that each format can be written, by the rule of `export`; labels that follow from the shots need not be recorded.
+    """Check that each format can be written, by the rule of `export`; labels that follow from the shots need not be recorded.
 
-    Raises UserError for a format that is unknown, does not work here, or cannot hold the plan, and for one that needs a
-    channel which no shot gives: a pass that an engine paints, point tracks, a LiDAR's points, or neighbouring frames.
+    Raises UserError for a format that is unknown, does not work here, or cannot hold the plan. Also raises it for a format that
+    needs a missing channel that shots cannot provide: a painted pass, point tracks, a LiDAR's points, or neighbouring frames.
     """
     scope = scope_of_plan(planned, channels)
     with planned.recipe.located():
@@ -69,7 +69,7 @@ def _check_labels(entry: FormatEntry, spec: FormatSpec, recipe: Recipe, channels
 
 
 def _absent(entry: FormatEntry, name: str, kept: Sequence[str], recipe: Recipe, sensor: Sensor) -> str:
-    """The message of a label that a format needs, and that has to be recorded."""
+    """The message about a label that a format needs and that the recipe has to record."""
     where, found = ("annotations", recipe.annotations) if name in on_request() else ("channels", kept)
     if where == "channels" and (sensor.channels or sensor.lidar):
         where = f"rig.sensors.{sensor.name}.channels"
@@ -81,18 +81,18 @@ def _absent(entry: FormatEntry, name: str, kept: Sequence[str], recipe: Recipe, 
 
 
 def to_render(planned: Plan, store: Store) -> DatasetPart:
-    """The part of the data set that this plan began before, else the whole of a new data set. Nothing is written.
+    """The part of the data set that this plan began earlier, else the whole of a new data set. Nothing is written.
 
-    Raises StoreError for a data set that another version made, or another state of the engine's program.
+    Raises StoreError for a data set from another version, or from another state of the engine's program.
     """
     found = None
-    with suppress(StoreError):  # whether another plan may be replaced, the store decides
+    with suppress(StoreError):  # the store decides whether it may replace another plan
         found = store.plan()
     number = found and found.part_with(planned.digest)
     if found is None or number is None:
         return whole(planned)
     if len(found.parts) == 1 and (found.version != version("viewsphere") or not _is_begun(store, found, number)):
-        return whole(planned)  # which the store refuses, or puts in the place of the one without frames
+        return whole(planned)  # the store refuses it, or replaces a plan without frames
     return _resumed(planned, store, found, number)
 
 
@@ -138,7 +138,7 @@ def _resumed(planned: Plan, store: Store, found: PlanRecord, number: int) -> Dat
 
 
 def _check_look(planned: Plan, store: Store, found: PlanRecord, number: int) -> None:
-    """Raise StoreError where a part's missing frames would be painted otherwise than those that it has."""
+    """Raise StoreError if a part's missing frames would be painted differently from its existing frames."""
     then, now = found.parts[number].settings.get(LOOK), engine_digest(planned.recipe.engine.name)
     if then in (None, now):
         return
@@ -147,7 +147,7 @@ def _check_look(planned: Plan, store: Store, found: PlanRecord, number: int) -> 
 
 
 def check_whether_same(store: Store, part: Part) -> None:
-    """Raise StoreError where a part's frames would not be rendered as they were: by another version, or painted otherwise."""
+    """Raise StoreError if a part's frames would now be rendered differently: by another version, or painted differently."""
     _check_versions(store, (part,))
     engine = part.recipe.get("engine", {}).get("name")
     if engine and part.settings.get(LOOK) not in (None, engine_digest(engine)):
@@ -172,7 +172,7 @@ def _check_versions(store: Store, parts: Iterable[Part]) -> None:
 
 
 def _is_begun(store: Store, found: PlanRecord, number: int) -> bool:
-    """Return whether any shot of a part is finished; takes as long as there are finished shots, however many are planned."""
+    """Return whether any shot of a part is finished; the time depends on the number of finished shots, not of planned ones."""
     return any(found.indices[number].find(key) for key in store.finished())
 
 

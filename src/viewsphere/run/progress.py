@@ -11,7 +11,7 @@ from dataclasses import dataclass
 class Progress:
     """The progress of a run: `done` of `total`; `resumed` of them were there before this run.
 
-    `under_way` are frames of unfinished shots, which do not count as done: a run that is stopped loses them.
+    `under_way` are finished frames of unfinished shots, which do not count as done: a run that is stopped loses them.
     `nodes` are the machines of a cluster at work, None without a cluster.
     Phases are skies (their pictures are analysed), models, kernels (compiled once on a machine, then cached), frames and
     exports (counted in frames, too). Phases without work are left out.
@@ -29,11 +29,11 @@ Listener = Callable[[Progress], None]
 
 
 def null_listener(progress: Progress) -> None:
-    """Nobody listens."""
+    """The listener that ignores progress."""
 
 
 def shown_on_terminal(progress: Progress) -> None:
-    """Count the kernels that are compiled in a line of standard error where that is a terminal; elsewhere stay silent."""
+    """Count compiled kernels in a line on standard error if it is a terminal; otherwise print nothing."""
     if sys.stderr is not None and sys.stderr.isatty():
         end = "\n" if progress.done == progress.total else ""
         sys.stderr.write(f"\rcompiling kernels, once on this machine: {progress.done} of {progress.total}{end}")

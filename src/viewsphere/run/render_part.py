@@ -22,16 +22,18 @@ from viewsphere.store import Store
 from viewsphere.store.shots.heartbeat import HeartbeatWriter
 
 MOST_SUBJECTS = 10_000
-"""Models or scenes whose cameras are looked at before rendering, evenly over all; the others are when their turn comes."""
+"""Number of models or scenes, evenly over all, whose cameras are checked before rendering; the rest are checked in their turn.
+"""
 
 MOST_SKIES = 64
-"""Files that are decoded before rendering, half a second each of 4,096 x 2,048 texels; the others are when their turn comes."""
+"""Number of files decoded before rendering, in half a second each of 4,096 x 2,048 texels; the rest are decoded in their turn.
+"""
 
 
 def check_skies(work: Missing, tell: Listener) -> tuple[str, ...]:
     """Decode the skies' pictures once, if any shot is left to render; returns the repairs that they needed.
 
-    Raises RecipeError for the first that is damaged, cut off, black, or mostly no numbers.
+    Raises RecipeError for the first picture that is damaged, truncated, black, or mostly NaN.
     """
     if next(work.rows(), None) is None:
         return ()
@@ -40,7 +42,7 @@ def check_skies(work: Missing, tell: Listener) -> tuple[str, ...]:
     chosen = list(files)[:: -(-len(files) // MOST_SKIES) or 1]
     notes: list[str] = []
     for done, file in enumerate(chosen):
-        from viewsphere.rendering.sky.environment_file import read_environment  # which takes a third of a second to load
+        from viewsphere.rendering.sky.environment_file import read_environment  # takes a third of a second to load
 
         tell(Progress("skies", done, len(chosen)))
         notes += read_environment(Path(file)).notes
@@ -51,10 +53,11 @@ def check_skies(work: Missing, tell: Listener) -> tuple[str, ...]:
 def render_part(
     work: Missing, pool: WorkerPool, keep_going: bool, tell: Listener, pulse: HeartbeatWriter
 ) -> tuple[int, dict[str, str]]:
-    """Make the part's models, take it into the data set, render its shots; gives the frames made and what was left out."""
+    """Make the part's models, add the part to the data set and render its shots; returns the frames made and what was left out.
+    """
     portion, store = work.portion, work.store
     if portion.number:
-        store.drop_unnamed_models()  # of appending that ended before it began
+        store.drop_unnamed_models()  # from an append that stopped before its part was added
     try:
         work.skipped.update(_prepare_models(portion, store, pool, keep_going, tell))
         commit(portion, store)
@@ -69,7 +72,7 @@ def render_part(
 
 
 def _prepare_models(portion: DatasetPart, store: Store, pool: WorkerPool, keep_going: bool, tell: Listener) -> dict[str, str]:
-    """Normalise and export every model; gives the keys left out, and why."""
+    """Normalise and export every model; returns the keys left out, with the reasons."""
     planned = portion.plan
     jobs = _model_jobs("same model" if portion.number else "model", portion)
     total = len(jobs.all)
@@ -97,7 +100,7 @@ def _model_jobs(kind: Kind, portion: DatasetPart) -> Listed:
 
 
 def compare_models(portion: DatasetPart, store: Store, pool: WorkerPool) -> None:
-    """Raises StoreError where a model is no longer the one that the data set shows."""
+    """Raise StoreError if a model no longer matches the one in the data set."""
     held = (job for job in _model_jobs("same model", portion).all if store.model_info(job.key) is not None)
     errors = [outcome.error for outcome in pool.run(Listed(tuple(held))) if outcome.error]
     if errors:
@@ -105,7 +108,7 @@ def compare_models(portion: DatasetPart, store: Store, pool: WorkerPool) -> None
 
 
 def _distance_problems(portion: DatasetPart, store: Store, failed: Container[str]) -> Iterator[tuple[str, ViewsphereError]]:
-    """Models or scenes that some pose's camera would stand inside of, or that have no room; each is named once."""
+    """Models or scenes with a pose's camera inside them, or without enough room; each is named once."""
     distances, subjects = Distances(portion.plan, StoredBoxes(store)), portion.subjects
     for subject in subjects[:: -(-len(subjects) // MOST_SUBJECTS) or 1]:
         if any(member.key in failed for member in portion.plan.cast(subject)):
@@ -119,7 +122,7 @@ def _distance_problems(portion: DatasetPart, store: Store, failed: Container[str
 
 
 def _render_shots(work: Missing, pool: WorkerPool, keep_going: bool, tell: Listener, pulse: HeartbeatWriter) -> int:
-    """Render the shots that the store lacks; gives the number of frames made. Failed shots land in what was left out."""
+    """Render the shots that the store lacks; returns the number of frames made. Failed shots are added to those left out."""
     portion, store, skipped = work.portion, work.store, work.skipped
     total, resumed, rendered = work.total, work.resumed, 0
     first = next(work.rows(), None)
@@ -139,7 +142,7 @@ def _render_shots(work: Missing, pool: WorkerPool, keep_going: bool, tell: Liste
     lost: list[ViewsphereError] = []
     for outcome in _watched(pool, work, pulse, report) if first is not None else ():
         if isinstance(outcome.error, WorkerDied) and not keep_going:
-            lost.append(outcome.error)  # the others are made nevertheless
+            lost.append(outcome.error)  # the other shots are still made
         else:
             _accept(outcome, keep_going, skipped)
             if outcome.error is not None and len(skipped).bit_count() == 1:  # the list is not written for each of thousands
@@ -160,7 +163,7 @@ def _accept(outcome: Outcome, keep_going: bool, skipped: dict[str, str]) -> None
 
 
 def _note_skipped(portion: DatasetPart, store: Store, skipped: dict[str, str]) -> None:
-    """Keep what was left out, of other parts and shares too."""
+    """Store what was left out, together with that of other parts and shards."""
     own = {spec.key for spec, _ in portion.models} | set(portion.subjects)
     with store.locked():
         others = {key: why for key, why in store.skipped().items() if key not in own and portion.find(key) is None}
@@ -181,7 +184,7 @@ def tee(pulse: HeartbeatWriter, listener: Listener) -> Listener:
 
 
 def _watched(pool: WorkerPool, work: Work, pulse: HeartbeatWriter, report: Callable[[], None]) -> Iterator[Outcome]:
-    """Yield the outcomes of `pool.run`; meanwhile the heartbeat reports the jobs that are handed out and not done."""
+    """Yield the outcomes of `pool.run`; meanwhile the heartbeat reports jobs that are handed out but not done."""
     for outcome in pool.run(_NotedWork(work, pulse.working_on), report):
         pulse.working_on.pop(outcome.key, None)
         yield outcome

@@ -1,4 +1,4 @@
-"""Recipes that render data sets of others again: a folder with the recipe, its file of shots, and what else it names."""
+"""Recipes that reproduce foreign data sets: a folder with the recipe, its file of shots, and other files that it names."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from viewsphere.validation.errors import one_of
 
 @dataclass(frozen=True)
 class Made:
-    """A recipe that was made: its file, how many shots and models it has, and what is to be said of it."""
+    """A new recipe: its file, the numbers of its shots and models, and notes about it."""
 
     recipe: Path
     shots: int

@@ -33,13 +33,13 @@ from viewsphere.run.exports.scope import needs_of
 from viewsphere.store.source_cameras import Drafted, SourceCameras, SourceModel
 
 FILLED = 0.5
-"""Share of a picture's width that it fills, of half of the cameras."""
+"""Share of a picture's width that the stand-in fills for half of the cameras."""
 
 SHORTEST = 1e-3
-"""Metres: of the model, and of what cameras are apart that do not stand at one place."""
+"""Minimum length of the stand-in, and minimum distance between cameras at different places, metres."""
 
 LONGEST = 0.9
-"""Of the size that models may have."""
+"""Maximum length of the stand-in, as a share of the size that models may have."""
 
 PARALLEL = 1e-6
 """Smallest of the singular values, as a share of the largest, at which optical axes meet somewhere."""
@@ -48,7 +48,7 @@ PARALLEL = 1e-6
 RECIPE, SHOTS, MODELS, SIDECARS = "recipe.yaml", "shots.jsonl", "models", "symmetries"
 CHANNELS = ("rgb", "depth", "instances")
 STAND_IN = "stand-in"
-"""The key, among an `SourceCameras`'s models, of what stands where there are none."""
+"""The key of the stand-in among the models of a `SourceCameras`, used if it has no models."""
 
 COMMENTS = {
     "models": "the data set's own, where they lie, with their own axes, origin and unit",
@@ -65,8 +65,8 @@ NONE_OF_ITS_OWN = (
 
 
 def draft(found: SourceCameras, of: str, folder: Path) -> Iterator[tuple[str, bytes]]:
-    """The files, by their names from the folder in which they are going to lie, those that the recipe names first: each has to
-    be written before the next is asked for. `of`: what is rendered again, in words.
+    """The files, by their names relative to `folder`, beginning with those that the recipe names. Each has to be written
+    before the next is requested. `of` describes the data set in words.
     """
     entries: list[dict[str, Any]] = []
     sources: dict[str, str] = {}
@@ -102,7 +102,7 @@ def _entry(model: SourceModel, source: str, sidecar: str | None) -> dict[str, An
 
 
 def _joined(entries: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
-    """Entries that differ in their files alone as one."""
+    """Entries with those that differ only in their files joined into one."""
     found: dict[str, dict[str, Any]] = {}
     for entry in entries:
         rest = json.dumps({name: value for name, value in entry.items() if name != "source"})
@@ -114,7 +114,7 @@ def _joined(entries: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
 
 
 def _shots(found: SourceCameras, substitute: StandIn | None) -> list[ListedShot]:
-    """The shots with free names, and splits as recipes have them; with what stands in, where they have to be listed."""
+    """The shots with unique names and valid split names; they show the stand-in if they have to be listed."""
     splits, names = dict[str, str](), dict[str, int]()
     shots: list[ListedShot] = []
     there: tuple[ListedObject, ...] = ()
@@ -130,19 +130,19 @@ def _shots(found: SourceCameras, substitute: StandIn | None) -> list[ListedShot]
 
 
 def _are_listed(found: SourceCameras) -> bool:
-    """Return whether shots differ in what only listed ones may: their pictures' sizes, and the splits that they say."""
+    """Return whether shots have to be listed, because the sizes of their pictures or their splits differ."""
     sizes = {(shot.camera.width, shot.camera.height) for shot in found.shots if shot.camera}
     return len(sizes) > 1 or len({shot.split for shot in found.shots}) > 1
 
 
 def _split(name: str) -> str:
-    """A split's name as recipes take it."""
+    """A split's name in the form that recipes accept."""
     plain = re.sub(r"[^A-Za-z0-9_-]", "_", name)[:90]
     return plain if re.match("[A-Za-z]", plain) and not is_reserved(plain) else f"split_{plain}"
 
 
 def _free(name: str, names: dict[str, int]) -> str:
-    """The name, with a number behind it where it is taken; `names`: those that are, each with the next number to try."""
+    """The name, with a number appended if it is taken; `names` has the taken names, each with the next number to try."""
     free, taken = name, name.casefold()
     while free.casefold() in names:
         free = f"{name[:90]}-{names[taken]}"
@@ -203,7 +203,7 @@ def _line(shot: ListedShot, keys: dict[str, str]) -> dict[str, Any]:
 
 
 def _text(data: dict[str, Any], of: str, found: SourceCameras, substitute: StandIn | None) -> str:
-    """The recipe, with a comment before each part that has one."""
+    """The text of the recipe, with comments before its parts."""
     head = [
         f"Renders a data set again: {of}",
         "Try it:   viewsphere preview recipe.yaml     then:   viewsphere render recipe.yaml -o dataset",
@@ -230,8 +230,8 @@ class StandIn:
 
 
 def stand_in(shots: Sequence[ListedShot]) -> StandIn:
-    """A model at the point that is nearest to all optical axes, or ahead of the first camera where these are parallel or meet
-    behind it or in it; as large as half of the cameras show it well, and not so large that one would be inside.
+    """A model at the point nearest to all optical axes. If the axes are parallel, or meet behind or in a camera, it is ahead
+    of the first camera. Its size suits half of the cameras, and no camera is inside it.
     """
     poses = np.array([shot.world_from_camera for shot in shots])
     centers, axes = poses[:, :3, 3], poses[:, :3, 2]

@@ -1,6 +1,6 @@
-"""The shard of the frames that this process renders: that of a job array's task, a rank, or a data loader's worker.
+"""The shard of the frames that this process renders: for a job array's task, a rank, or a data loader's worker.
 
-PyTorch is consulted only if the program has already imported it: it is no dependency.
+PyTorch is used only if the program has already imported it, because it is not a dependency.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ def shard_of(shard: object) -> Shard:
 
 
 def shard_named(text: str) -> tuple[int, int]:
-    """The shard that the command line names k/n, k from 0; raises UserError for anything else."""
+    """The shard given on the command line as k/n, k from 0; raises UserError for anything else."""
     found = re.fullmatch(r"([0-9]{1,9})/([0-9]{1,9})", text)
     if found is None or int(found[1]) >= int(found[2]):
         raise UserError(f"--shard: expected k/n, the k-th of n shards counted from 0, such as 0/16; found {shown(text)}")
@@ -34,7 +34,7 @@ def shard_named(text: str) -> tuple[int, int]:
 
 
 def shard_of_rank() -> Shard:
-    """The shard of this process among the ranks of PyTorch's default process group; all where there is none."""
+    """The shard of this process among the ranks of PyTorch's default process group; all frames without a group."""
     distributed: Any = sys.modules.get("torch.distributed")
     if distributed is None or not distributed.is_available() or not distributed.is_initialized():
         return Shard()
@@ -42,10 +42,10 @@ def shard_of_rank() -> Shard:
 
 
 def shard_of_worker(frames: object) -> Shard:
-    """The shard of this process among the workers of a PyTorch DataLoader that iterates over its data set; all where this
-    is none, or where the loader itself says which item each worker makes.
+    """The shard of this process among the workers of a PyTorch DataLoader that iterates over its data set. It is all frames
+    outside such a worker, or if the loader itself chooses the items of each worker.
 
-    `frames`: what may be the loader's data set itself.
+    `frames` may be the loader's data set itself.
     """
     data: Any = sys.modules.get("torch.utils.data")
     if data is None:

@@ -14,8 +14,8 @@ from viewsphere.store.shots.heartbeat import SILENT_S, Heartbeat
 
 @dataclass(frozen=True)
 class Run:
-    """A run at work: what it told last, and how many seconds ago. Its `state` is running, or dead (its process is no more), or
-    silent (of another machine, and nothing was heard of it for SILENT_S seconds: dead, most likely).
+    """A run at work: its last report, and the report's age in seconds. Its `state` is running, dead (its process is gone), or
+    silent (on another machine, without a report for SILENT_S seconds, so most likely dead).
     """
 
     told: Heartbeat
@@ -30,10 +30,10 @@ class Status:
     Frames are counted shot by shot: those that are `finished`, `left_out` at the user's request, and `missing`.
     The missing include those `under_way` (made by a run, in incomplete shots: lost if the run dies).
     Frames that get a channel later count once more.
-    `models` are keys of models that are still to be made. `failed` are the last reports of shards that ended with an error,
+    `models` are keys of models that are still missing. `failed` are the last reports of shards that ended with an error,
     until they run again.
-    `rate` is that of all runs together, frames a second; `seconds_left` is for the missing frames at this rate, None while no
-    run makes frames.
+    `rate` is the rate of all runs together, frames a second; `seconds_left` is the time for the missing frames at this rate,
+    None while no run makes frames.
     """
 
     root: Path
@@ -46,17 +46,17 @@ class Status:
 
     @property
     def left_out(self) -> int:
-        """Frames that nobody is to make."""
+        """Frames that the plan contains but no run will make."""
         return self.frames - self.finished - self.missing
 
     @property
     def under_way(self) -> int:
-        """Missing frames that runs have made, of shots that are not whole."""
+        """Missing frames that runs have made, in incomplete shots."""
         return sum(run.told.under_way for run in self.runs if run.state == "running")
 
     @property
     def complete(self) -> bool:
-        """Return whether nothing is left to be made, but exports."""
+        """Return whether nothing except exports is left to make."""
         return not self.missing and not self.models
 
     @property

@@ -1,4 +1,4 @@
-"""A data set of any size as a page that lives: a server for one's own browser, which reads only what is shown."""
+"""A live page for data sets of any size: a server for the user's own browser, which reads only the shown frames."""
 
 from viewsphere.view.live import Live
 from viewsphere.view.server import PORT, Address, Server

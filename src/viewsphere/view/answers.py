@@ -1,4 +1,4 @@
-"""The server's answers: the paths that a page may request, and no others. No part of a path ever becomes a file's name."""
+"""The server's answers: the paths that a page may request, and no others. No part of a path is ever used as a file name."""
 
 from __future__ import annotations
 
@@ -37,16 +37,16 @@ VENDOR = "/vendor.js"
 
 SMALL = Scale(400, 78, 400, quick=True)
 LARGE = Scale(1600, 88, 1600)
-"""The pictures of cards, and those that are enlarged."""
+"""The scales of the cards' pictures and of enlarged pictures."""
 
 MOST_ROWS = 200
-"""Frames that are told of at once."""
+"""Maximum number of frames in one answer."""
 
 RENEWED = 5.0
-"""Seconds for which the counts of all frames are not counted again."""
+"""Seconds for which the counts of all frames are cached."""
 
 PAINTERS_AT_ONCE = 4
-"""Pictures that are made at once."""
+"""Number of pictures that are made at the same time."""
 
 
 @dataclass(frozen=True)
@@ -66,7 +66,7 @@ class Answers:
 
     def __init__(self, live: Live) -> None:
         self._live = live
-        # The page's first lines are known before anybody asks: which labels there are takes a second to find out.
+        # The page's first lines are made in advance, because finding the labels takes a second.
         self._conventions = conventions()
         self._paths: dict[str, Callable[[Parameters], Answer]] = {
             "/": self._page,
@@ -85,9 +85,7 @@ class Answers:
         self._counted: tuple[int, float, bytes] | None = None
 
     def of(self, path: str, asked: Parameters) -> Answer | None:
-        """The answer to a path and its parameters, None where there is no such path; raises UserError where there is none to
-        these parameters.
-        """
+        """The answer to a path and its parameters; None for an unknown path. Raises UserError for invalid parameters."""
         known = self._paths.get(path)
         return None if known is None else known(asked)
 
@@ -119,8 +117,8 @@ class Answers:
         return _as_json(self._live.state())
 
     def _rows(self, asked: Parameters) -> Answer:
-        """The frames from the first asked for on, of those that meet a query. `listed` and `read` say of which frames: so many
-        of the list, and of the columns, as an answer before this one told.
+        """The frames that match a query, beginning with the first requested one. `listed` and `read` limit the frames to the
+        numbers of listed frames and columns in an earlier answer.
         """
         plain = dict(asked)
         first, count = _whole(plain, "first"), _whole(plain, "count")
@@ -128,7 +126,7 @@ class Answers:
         listed = len(known.frames) if listed < 0 else min(listed, len(known.frames))
         read = known.read if read < 0 else min(read, known.read)
         query = Query.of(plain)
-        # What a query needs not know of does not make it another one.
+        # Columns that a query does not need do not change it.
         searched = read if query.needs_labels else listed
         found = self._found(query, searched, read if query.needs_labels else 0)
         rows = found[first : first + min(count, MOST_ROWS)]
@@ -147,7 +145,7 @@ class Answers:
         return query.answer(self._live.known.first(listed, read))
 
     def _row(self, frame: int, made: float) -> dict[str, Any]:
-        """A frame as the report has it; its layers are paths. Of one that cannot be read: why."""
+        """A frame as in the report, with paths as layers; for an unreadable frame, the reason."""
         try:
             sample = self._live.sample(frame)
             plain = frame_data(sample)
@@ -210,7 +208,7 @@ def _one_of(name: str, found: str, known: list[str]) -> None:
 
 
 def _whole(asked: dict[str, str], name: str, default: int | None = None) -> int:
-    """Take a whole number from 0 on out of the parameters; raises UserError for anything else."""
+    """Remove a whole number of at least 0 from the parameters and return it; raises UserError for anything else."""
     text = asked.pop(name, "")
     if not text and default is not None:
         return default

@@ -1,7 +1,7 @@
 """The finished frames of a data set that may still grow, and the columns of their labels.
 
-Frames are listed as soon as they are finished, which reads no file; their columns follow, read in the background. Both only
-become longer, in one order: a row of the columns is the frame of that row of the list.
+Frames are listed as soon as they are finished, without reading a file; their columns are read later, in the background. Both
+only grow, in the same order: a row of the columns belongs to the same row of the list.
 """
 
 from __future__ import annotations
@@ -34,27 +34,27 @@ LISTED = np.dtype([("number", "i8"), ("made", "f8")])
 """A finished frame: its number in the plan, and when it was finished, in seconds since 1970."""
 
 PIECE = 2048
-"""Frames whose records are read at once, about."""
+"""Approximate number of frames whose records are read at once."""
 
 MANY = 2 * PIECE
-"""Frames without columns from which on other processes read them, so that this one has time for the page."""
+"""Number of frames without columns from which other processes read them, so that this process has time for the page."""
 
 KEPT = 512
-"""Samples whose records are kept."""
+"""Number of samples whose records are cached."""
 
 PAUSE = 0.5
-"""Seconds between two looks at the store."""
+"""Seconds between two checks of the store."""
 
 RECENT = 120.0
-"""Seconds whose frames say how fast a run is."""
+"""Length in seconds of the period that determines a run's speed."""
 
 MOST_FAILURES = 200
-"""Failures that a page is told of."""
+"""Maximum number of failures that a page receives."""
 
 
 @dataclass(frozen=True)
 class Shot:
-    """A finished shot: its key, its first frame, how many it has, when it was finished, and whether that was again."""
+    """A finished shot: its key, its first frame, its number of frames, its finish time, and whether it was remade."""
 
     key: str
     first: int
@@ -80,7 +80,7 @@ class Known:
         return len(self.damaged)
 
     def first(self, listed: int, read: int) -> Known:
-        """Return the state at which so many frames were listed, and so many of them read."""
+        """Return the state with only the first `listed` frames of the list and the first `read` rows of columns."""
         table = self.table
         objects = table.objects[: int(np.searchsorted(table.objects["frame"], read))]
         names = (table.splits, table.subjects, table.models, table.poses)
@@ -88,15 +88,15 @@ class Known:
 
     @property
     def sound(self) -> FrameTable:
-        """The columns of the frames that could be read."""
+        """The columns of the readable frames."""
         table = self.table
         return FrameTable(table.frames[~self.damaged], table.objects, table.splits, table.subjects, table.models, table.poses)
 
 
 class Live:
-    """Looks at a data set from a thread of its own, between `start` and `stop`.
+    """Watches a data set in a separate thread, between `start` and `stop`.
 
-    Raises StoreError where there is no data set, UserError for a URL, whose files it would have to ask for again and again.
+    Raises StoreError if there is no data set, UserError for a URL, whose files it would have to request repeatedly.
     """
 
     def __init__(self, root: Path, workers: int = 1) -> None:
@@ -117,11 +117,11 @@ class Live:
         self._thread = threading.Thread(target=self._look, name="viewsphere view", daemon=True)
 
     def start(self) -> None:
-        """Begin to look."""
+        """Start to watch."""
         self._thread.start()
 
     def stop(self) -> None:
-        """Look no more."""
+        """Stop watching."""
         self._end.set()
         self._thread.join()
 
@@ -132,9 +132,9 @@ class Live:
             return Known(self._frames.array, self._columns.table, self._damaged.array)
 
     def sample(self, number: int) -> Sample:
-        """The sample of a frame's number; raises StoreError for one that is not there or cannot be read.
+        """The sample of a frame's number; raises StoreError for a missing or unreadable one.
 
-        Records of late are kept for those who ask for their pictures; arrays are not.
+        Recent records are cached for requests of their pictures; arrays are not.
         """
         sample = self._sample(self.dataset, number)
         return replace(sample, channels=copy(sample.channels))
@@ -192,11 +192,11 @@ class Live:
         return subjects + sum(row.count for row in shots if not self.dataset.store.has_shot(row.key))
 
     def _look(self) -> None:
-        # Ctrl-C is for the main thread; readers that this one starts inherit that they do not hear of it.
+        # Ctrl-C is for the main thread; the readers that this thread starts inherit the blocked signal.
         if hasattr(signal, "pthread_sigmask"):
             signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
         while not self._end.is_set():
-            # A store that is moved away or cannot be read for a while shows as it was.
+            # If the store is moved or unreadable for a while, the page shows its last state.
             with suppress(OSError, ViewsphereError):
                 self._list_news()
             self._read_columns()
@@ -207,7 +207,7 @@ class Live:
         return found.st_mtime_ns, found.st_size
 
     def _list_news(self) -> None:
-        """Take in what was finished since; a plan that became longer, and shots that were made again, are read anew."""
+        """Add the newly finished frames; an extended plan and remade shots are read again."""
         news = sorted(self._news(), key=lambda shot: shot.first)
         if (seen := self._plan_time()) != self._plan_seen or any(shot.again for shot in news):
             self.dataset, self._plan_seen = Dataset(self.dataset.root), seen
@@ -222,7 +222,7 @@ class Live:
                 self._shots.append(shot)
 
     def _news(self) -> Iterator[Shot]:
-        """The shots of the plan's own frames that are new; those that add channels to older frames are none."""
+        """The new shots of the plan's own frames, without shots that add channels to older frames."""
         plan = self.dataset.plan
         for found in self._watch.news():
             row = plan.find(found.key)
@@ -235,7 +235,7 @@ class Live:
     def _read_columns(self) -> None:
         """Read the columns of all frames that have none, in the order of the list."""
         if sum(shot.count for shot in self._shots[self._shots_read :]) >= MANY:
-            with suppress(BrokenExecutor):  # then this process reads what is left, and tells which shot is to blame
+            with suppress(BrokenExecutor):  # then this process reads the rest, and reports the shot at fault
                 self._read_elsewhere()
         for piece in _pieces(self._shots[self._shots_read :]):
             if self._end.is_set():
@@ -243,7 +243,7 @@ class Live:
             self._take(piece, _tables(self.dataset, piece))
 
     def _read_elsewhere(self) -> None:
-        """Read the columns in other processes, and look for news meanwhile."""
+        """Read the columns in other processes, and check for new frames meanwhile."""
         ahead: deque[tuple[Sequence[Shot], Future[list[FrameTable | str]]]] = deque()
         with ProcessPoolExecutor(self._workers, get_context("spawn"), _step_back) as pool:
             for piece in _pieces(self._shots[self._shots_read :]):
@@ -273,7 +273,7 @@ class Live:
 
 
 def _step_back() -> None:
-    """Leave the processor to those who render, and to the page."""
+    """Lower this process's priority in favour of rendering and the page."""
     import os
 
     if hasattr(os, "nice"):
@@ -297,18 +297,18 @@ def _read(root: Path, shots: Sequence[Shot]) -> list[FrameTable | str]:
 
 
 def _tables(dataset: Dataset, shots: Sequence[Shot]) -> list[FrameTable | str]:
-    """The columns of each shot, or why it cannot be read."""
+    """The columns of each shot, or the reason why it cannot be read."""
     found: list[FrameTable | str] = []
     for shot in shots:
         try:
             found.append(table_of(dataset.samples_of(shot.key, range(shot.count))))
-        except (ViewsphereError, ArithmeticError, TypeError, ValueError) as error:  # numbers that no column holds, too
+        except (ViewsphereError, ArithmeticError, TypeError, ValueError) as error:  # also numbers that do not fit a column
             found.append(str(error))
     return found
 
 
 def _unknown(count: int, split: str) -> FrameTable:
-    """Columns of frames of which nothing is known; a split they have to have."""
+    """Columns of frames about which only the split is known."""
     frames = np.zeros(count, FRAME)
     for name in ("azimuth", "elevation", "distance"):
         frames[name] = np.nan
@@ -316,9 +316,10 @@ def _unknown(count: int, split: str) -> FrameTable:
 
 
 def _rate(made: NDArray[np.float64], now: float) -> float:
-    """Frames a second of late, by the times at which they were finished; 0 where none was of late, or nobody can tell.
+    """Recent frames a second, from the times at which they were finished; 0 if there are no recent frames or the rate is
+    unknown.
 
-    Times to come are from before the clock was set back, and do not count.
+    Future times are from before the clock was set back, and do not count.
     """
     recent = np.sort(made[(made >= now - RECENT) & (made <= now)])
     if not len(recent) or recent[0] == recent[-1]:

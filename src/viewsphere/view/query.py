@@ -38,18 +38,18 @@ MEASURES = {
     "objects": Measure("Objects", "", "objects", False),
     "seen": Measure("Objects seen", "", "seen", False),
 }
-"""By the names that a page says."""
+"""The measures by the names that a page uses."""
 
 ORDERS = ("newest", "frame", "mixed")
-"""Orders besides those by a measure."""
+"""Orders other than by a measure."""
 
 KNUTH = 2654435761
-"""The golden ratio as a share of 2**32: multiples of it jump about evenly."""
+"""The golden ratio as a share of 2**32: its multiples are spread evenly."""
 
 
 @dataclass(frozen=True)
 class Within:
-    """A measure between two numbers, both inclusive, but for azimuths, which come round: from the first up to the second."""
+    """A measure between two numbers, both inclusive; azimuths wrap around, from the first number up to the second."""
 
     measure: str
     low: float
@@ -72,12 +72,12 @@ class Query:
 
     @property
     def needs_labels(self) -> bool:
-        """Return whether it cannot be answered of frames without columns."""
+        """Return whether it needs the columns of frames."""
         return self != Query(order=self.order) or self.order not in ORDERS
 
     @staticmethod
     def of(asked: Mapping[str, str]) -> Query:
-        """The query of a page's parameters; raises UserError for one that cannot be."""
+        """The query from a page's parameters; raises UserError for an invalid one."""
         known = {"category", "model", "split", "pose", "order", *MEASURES}
         for name in asked.keys() - known:
             raise UserError(f"{name}: expected one of {', '.join(sorted(known))}; found another")
@@ -92,7 +92,7 @@ class Query:
         return Query(int(category) if category else None, model, split, pose, within, order)
 
     def answer(self, known: Known) -> NDArray[np.intp]:
-        """Rows of the frames that meet it, in its order."""
+        """Rows of the frames that match the query, in its order."""
         table = known.table
         if not self.needs_labels:
             return _ordered(self.order, known.frames)
@@ -148,7 +148,7 @@ class Query:
 
 
 def _is_within(rows: NDArray[Any], one: Within) -> NDArray[np.bool_]:
-    values = rows[MEASURES[one.measure].column].astype(np.float64)  # as wide as what is asked for
+    values = rows[MEASURES[one.measure].column].astype(np.float64)  # as precise as the query
     if MEASURES[one.measure].column == "azimuth":
         low, high = (free if math.isinf(end) else end for end, free in ((one.low, 0.0), (one.high, 360.0)))
         return (values - math.fmod(low, 360.0)) % 360 < high - low

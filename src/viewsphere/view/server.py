@@ -1,11 +1,11 @@
-"""The server: it answers browsers that bring its token.
+"""The server, which answers only browsers that send its token.
 
 Slow clients do not delay others: a request has a deadline, and the number of connections has a limit. Beyond the limit a new
-connection replaces the one whose request is awaited for longest.
+connection replaces the one that has waited longest for its request.
 
-A page of a stranger that is open in the same browser is kept out, too: its requests name another host (DNS rebinding) or say
-that they come from elsewhere (Sec-Fetch-Site), no header allows it to read an answer (CORS), and what it embeds of this server
-the browser does not show it (Cross-Origin-Resource-Policy).
+A foreign page in the same browser has no access either. Its requests name another host (DNS rebinding) or another origin
+(Sec-Fetch-Site), and no header allows it to read an answer (CORS). The browser also blocks embedded content of this server
+(Cross-Origin-Resource-Policy).
 """
 
 from __future__ import annotations
@@ -41,19 +41,19 @@ PORT = 8642
 LOOPBACK = "127.0.0.1"
 
 QUIET = 30.0
-"""Seconds from an answer (or the begin) until the next request is whole: browsers keep idle connections for as long."""
+"""Seconds from an answer (or the start) until the next request is complete: browsers keep idle connections this long."""
 
 MOST_CONNECTIONS = 256
 """Connections at once, each a thread. A browser opens 6; half of a usual limit of 1,024 open files stays free for pictures."""
 
 MOST_HEAD = 32_768
-"""Bytes of a request's line and headers; those of a browser with a large cookie jar are half as many."""
+"""Maximum bytes of a request's line and headers; a browser with a large cookie jar sends half as many."""
 
 CROWDED = 0.05
-"""Seconds to wait where the system gives no more connections, so that the server does not spin."""
+"""Seconds to wait if the system provides no more connections, so that the server does not spin."""
 
 TOKEN = re.compile(r"[A-Za-z0-9_-]{16,256}")
-"""Form of a token, which is used in an address and in a cookie."""
+"""The form of a token, which is part of an address and a cookie."""
 
 WORD = re.compile(rb"[A-Za-z0-9_-]{16,}")
 """Parts of a request that may be a token."""
@@ -63,7 +63,7 @@ WITHOUT_TOKEN = "expected the address that viewsphere view printed, with its tok
 TEXT = "text/plain; charset=utf-8"
 
 MOST_PARAMETERS = 40
-"""Parameters of a request, at most."""
+"""Maximum number of parameters in a request."""
 
 GUARD = {
     "X-Content-Type-Options": "nosniff",
@@ -75,7 +75,7 @@ GUARD = {
 """Sent with every answer."""
 
 NOTHING = "default-src 'none'; frame-ancestors 'none'"
-"""The policy of answers that are no page; a page says in its head what it may load."""
+"""The policy of answers other than pages; a page declares in its head what it may load."""
 
 OWN_SITES = ("same-origin", "none")
 """Values of a browser's header for requests from this server's page, or from no page."""
@@ -83,7 +83,7 @@ OWN_SITES = ("same-origin", "none")
 
 @dataclass(frozen=True)
 class Address:
-    """The address to listen at; `port` 0 is any that is free. Without a token the server makes one."""
+    """The address to listen at; `port` 0 means any free port. Without a token the server makes one."""
 
     host: str = LOOPBACK
     port: int = PORT
@@ -91,7 +91,7 @@ class Address:
 
     @property
     def is_loopback(self) -> bool:
-        """Return whether only this machine reaches it."""
+        """Return whether only this machine can reach the address."""
         if self.host == "localhost":
             return True
         address = _address(self.host)
@@ -99,9 +99,9 @@ class Address:
 
 
 class Server(ThreadingMixIn, TCPServer):
-    """Answers of one data set, at an address. Raises UserError where one cannot listen there.
+    """A server for one data set at an address. Raises UserError if it cannot listen there.
 
-    A plain `TCPServer`: http.server's own asks a name server for this machine's name before it listens.
+    It is a plain `TCPServer`, because http.server's own class queries a name server for this machine's name first.
     """
 
     daemon_threads = True
@@ -136,21 +136,21 @@ class Server(ThreadingMixIn, TCPServer):
 
     @property
     def cookie(self) -> str:
-        """The name of the cookie that holds the token: cookies do not tell ports apart."""
+        """The name of the token's cookie; it contains the port, because cookies do not distinguish ports."""
         return f"viewsphere-{self.port}"
 
     def names(self, host: str) -> bool:
-        """Return whether a request's Host is this server: a name that a stranger made lead here is not."""
+        """Return whether a request's Host is this server's, and not a foreign name that resolves to it."""
         name, port = _parted(host)
         if port != self.port:
             return False
         if self.address.is_loopback:
             return name in {"localhost", "127.0.0.1", "::1", self.address.host.lower()}
-        # An address is no name that a stranger could own; whoever comes by one has a token besides.
+        # Nobody else can own an IP address as a name, and its requests need the token as well.
         return _address(name) is not None or name in {"localhost", self.address.host.lower(), socket.gethostname().lower()}
 
     def get_request(self) -> tuple[socket.socket, Any]:
-        """The next connection; where the system gives no more, the longest silent one ends, and OSError is raised."""
+        """The next connection. If the system provides no more, the connection that is silent longest ends; raises OSError."""
         try:
             return super().get_request()
         except OSError as error:
@@ -160,7 +160,7 @@ class Server(ThreadingMixIn, TCPServer):
             raise
 
     def process_request(self, request: Any, client_address: Any) -> None:
-        """Answer a connection in a thread of its own."""
+        """Answer a connection in a separate thread."""
         self.lines.add(request)
         super().process_request(request, client_address)
 
@@ -170,22 +170,22 @@ class Server(ThreadingMixIn, TCPServer):
         super().shutdown_request(request)
 
     def service_actions(self) -> None:
-        """End connections whose request is not whole by its deadline."""
+        """End connections whose request is incomplete at its deadline."""
         self.lines.end_late()
 
     def handle_error(self, request: Any, client_address: Any) -> None:
-        """Somebody hung up, or a mistake of ours: in a line, for the page's other requests go on."""
+        """Report an internal error in one line, and ignore closed connections; other requests continue."""
         error = sys.exc_info()[1]
         if not isinstance(error, (ConnectionError, TimeoutError)):
             self.complain(error)
 
     def complain(self, error: BaseException | None) -> None:
-        """Tell the one who runs the server of a mistake of ours."""
+        """Print an internal error for the user who runs the server."""
         print(printable(f"viewsphere: view: {type(error).__name__}: {error}"), file=sys.stderr)  # noqa: T201
 
 
 class Lines:
-    """The open connections, each with the time since when the server has been waiting for its request."""
+    """The open connections, each with the time at which the server began to wait for its request."""
 
     def __init__(self) -> None:
         self._waiting: dict[socket.socket, float] = {}
@@ -193,7 +193,7 @@ class Lines:
         self._lock = threading.Lock()
 
     def add(self, line: socket.socket) -> None:
-        """Count a new connection; where there are too many the longest silent one ends."""
+        """Count a new connection; if there are too many, the one that is silent longest ends."""
         with self._lock:
             is_crowded = len(self._waiting) + len(self._answered) >= MOST_CONNECTIONS
         if is_crowded:
@@ -201,31 +201,31 @@ class Lines:
         self.wait(line)
 
     def wait(self, line: socket.socket) -> None:
-        """From now on the server waits for a request of a connection."""
+        """Note that the server now waits for a request on a connection."""
         with self._lock:
             self._answered.pop(line, None)
             self._waiting[line] = time.monotonic()
 
     def hear(self, line: socket.socket) -> None:
-        """A connection's request is whole."""
+        """Note that a connection's request is complete."""
         with self._lock:
             self._waiting.pop(line, None)
             self._answered[line] = None
 
     def remove(self, line: socket.socket) -> None:
-        """A connection is closed."""
+        """Note that a connection is closed."""
         with self._lock:
             self._waiting.pop(line, None)
             self._answered.pop(line, None)
 
     def end_oldest(self) -> None:
-        """End the connection whose request is awaited for longest, else the one that takes longest to read its answer."""
+        """End the connection that has waited longest for its request, else the one that takes longest to read its answer."""
         with self._lock:
             for line in (*islice(self._waiting, 1), *islice(self._answered, 1))[:1]:
                 self._end(line)
 
     def end_late(self) -> None:
-        """End the connections whose request is awaited for longer than `QUIET`."""
+        """End the connections that have waited longer than `QUIET` for their request."""
         with self._lock:
             past = time.monotonic() - QUIET
             for line in [line for line, since in self._waiting.items() if since < past]:
@@ -239,7 +239,7 @@ class Lines:
 
 
 def _parted(host: str) -> tuple[str, int | None]:
-    """The name, in lower case, and the port of a Host; None for one that is no port."""
+    """The name, in lower case, and the port of a Host; None for an invalid port."""
     found = re.fullmatch(r"(\[[0-9a-fA-F:.]+\]|[^\[\]:/\\@\s]+)(?::([0-9]{1,5}))?", host)
     if found is None:
         return "", None
@@ -283,10 +283,10 @@ class _Handler(BaseHTTPRequestHandler):
         self._answer()
 
     def log_message(self, format: str, *args: Any) -> None:
-        """Nothing: a page asks a dozen times a second."""
+        """Log nothing, because a page sends a dozen requests a second."""
 
     def send_error(self, code: int, message: str | None = None, explain: str | None = None) -> None:
-        """Refuse in one line of text, and hang up: what follows on this connection may be anything."""
+        """Refuse in one line of text and close the connection, because any further data on it is unreliable."""
         self.close_connection = True
         self._send(HTTPStatus(code), Answer(f"{message or HTTPStatus(code).phrase}\n".encode("utf-8", "replace"), TEXT))
 
@@ -296,7 +296,7 @@ class _Handler(BaseHTTPRequestHandler):
         super().handle_one_request()
 
     def parse_request(self) -> bool:
-        """Return whether there is a request to be answered. Headers are parsed only of requests that hold the token."""
+        """Return whether there is a request to answer. Headers are parsed only for requests that contain the token."""
         self.request_version, self.requestline = self.protocol_version, ""
         self.command = "HEAD" if self.raw_requestline.startswith(b"HEAD ") else "GET"
         head = self._head()
@@ -325,7 +325,7 @@ class _Handler(BaseHTTPRequestHandler):
         return head
 
     def _holds_token(self, head: bytes) -> bool:
-        """Return whether a word of the head is the token, compared in constant time; `_has_token` looks where it stands."""
+        """Return whether a word of the head is the token, compared in constant time; `_has_token` checks its place."""
         token = self.server.token.encode()
         return any([hmac.compare_digest(word, token) for word in WORD.findall(head)])
 
@@ -385,7 +385,7 @@ class _Handler(BaseHTTPRequestHandler):
         return any([hmac.compare_digest(one.encode("utf-8", "replace"), token) for one in given])
 
     def _to_page(self) -> None:
-        """Keep the token in a cookie, so that it stands in no address that is shown, kept or sent on."""
+        """Store the token in a cookie, so that no shown, stored or forwarded address contains it."""
         cookie = f"{self.server.cookie}={self.server.token}; Path=/; HttpOnly; SameSite=Strict"
         self._send(HTTPStatus.SEE_OTHER, Answer(b"", TEXT), {"Location": "/", "Set-Cookie": cookie})
 

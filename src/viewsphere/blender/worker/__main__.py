@@ -29,7 +29,7 @@ ONLINE = ("socket.connect", "socket.getaddrinfo", "socket.gethostbyname", "socke
 
 
 def main(folder: Path, readable: list[str] | None = None, threads: int = 0) -> None:
-    """Answer requests until the input ends; `folder`, where the requests' arrays lie, is removed then.
+    """Answer requests until the input ends, then remove `folder`, which contains the requests' arrays.
 
     With `readable`, files are read only from these folders and from the system's, and written only to `folder`, where the
     system can enforce it. Blender works with this many `threads`, 0 for one a core.
@@ -50,7 +50,7 @@ def main(folder: Path, readable: list[str] | None = None, threads: int = 0) -> N
         try:
             answers.write(said + b"\n")
             answers.flush()
-        except OSError:  # nobody listens
+        except OSError:  # the parent is gone
             _leave(folder)
 
 
@@ -80,7 +80,7 @@ def answer(request: bytes) -> bytes:
 
 @cache
 def start_blender() -> None:
-    """Import bpy and forbid what a file could do beyond being a scene: run scripts, reach the network."""
+    """Import bpy and forbid files to run scripts or to use the network."""
     import bpy
 
     preferences = bpy.context.preferences
@@ -116,7 +116,7 @@ def _leave(folder: Path) -> None:
 
 
 def _hello(_: dict[str, Any]) -> dict[str, Any]:
-    """Versions, and what Cycles can compute on."""
+    """Versions, and the devices of Cycles."""
     import bpy
     import numpy as np
 

@@ -1,1 +1,1 @@
-"""Proofs of frames: rays, labels computed again, pictures painted again."""
+"""Proofs of frames: rays, recomputed labels, repainted pictures."""

@@ -1,4 +1,4 @@
-"""Proofs of what is said of a frame beside its labels: its files, its objects' numbers, and its camera."""
+"""Proofs of a frame's facts other than labels: its files, its objects' ids, and its camera."""
 
 from __future__ import annotations
 
@@ -22,7 +22,8 @@ SHARE_TOLERANCE = 1e-4
 
 
 def files(sample: Sample) -> Iterator[str]:
-    """Every channel's file is that of the frame, is there and holds an array of the image's size; passes hold what they may."""
+    """Every channel's file belongs to the frame, exists, and contains an array of the image's size; passes have valid values.
+    """
     height, width = sample.height, sample.width
     for name, file in sample.files.items():
         if file.split("/")[-2:] != [name, f"{sample.index:08d}{PurePosixPath(file).suffix}"]:
@@ -40,7 +41,7 @@ def files(sample: Sample) -> Iterator[str]:
 
 
 def _passes(sample: Sample, name: str, array: NDArray[Any]) -> Iterator[str]:
-    """Light is a number and not negative; shares are at most 1, but for the colours of a user's own .blend scene."""
+    """Light is a number and not negative; shares are at most 1, except for colours in a user's own .blend scene."""
     is_own = sample.origin is not None and sample.origin.shot is not None and sample.origin.shot.scene.blend is not None
     most = np.inf if PASSES[name].unit != "1" or is_own else 1 + SHARE_TOLERANCE
     wrong = ~(np.isfinite(array) & (array >= 0) & (array <= most))
@@ -57,7 +58,7 @@ def ids(sample: Sample) -> Iterator[str]:
 
 
 def camera(sample: Sample) -> Iterator[str]:
-    """The camera stands and looks as its azimuth, elevation, distance and tilt say."""
+    """The camera's pose matches its azimuth, elevation, distance and tilt."""
     if sample.known_camera is None:
         return
     known = sample.camera
@@ -76,4 +77,4 @@ def camera(sample: Sample) -> Iterator[str]:
 
 
 FRAME_PROOFS: dict[str, Callable[[Sample], Iterator[str]]] = {"files": files, "ids": ids, "camera": camera}
-"""Checks of every frame by name; those of labels stand in their files."""
+"""Checks of every frame by name; the proofs of labels are in the labels' files."""

@@ -9,14 +9,14 @@ from textwrap import shorten
 from typing import Any
 
 MOST = 5
-"""Differences of one file that are reported: one wrong field of a recipe often changes many of a plan."""
+"""Maximum number of reported differences per file: one wrong field of a recipe often changes many fields of a plan."""
 
 Difference = tuple[str, Any, Any]
 """The path of a field, the expected value and the stored one."""
 
 
 class Absent:
-    """Stands for a field that is not there."""
+    """Represents a missing field."""
 
     def __repr__(self) -> str:
         return "no such field"
@@ -40,7 +40,7 @@ def differences(expected: Any, found: Any, path: str = "") -> Iterator[Differenc
 
 
 def in_words(found: Iterator[Difference], file: str, source: str) -> Iterator[str]:
-    """The first differences of a file from what `source` gives."""
+    """The first differences between a file and the values from `source`, in words."""
     for path, expected, value in islice(found, MOST):
         yield f"{file}: {path}: expected {_short(expected)}, which {source} gives; found {_short(value)}"
 

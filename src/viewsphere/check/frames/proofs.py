@@ -1,4 +1,4 @@
-"""Return all proofs of frames: against themselves, their shots and plan, the models, and what the recipe gives."""
+"""All proofs of frames: against themselves, their shots and plan, the models, and the recipe."""
 
 from __future__ import annotations
 
@@ -30,8 +30,8 @@ from viewsphere.store.index import numbers
 
 @dataclass(frozen=True)
 class Chosen:
-    """The positions whose labels are computed again and those painted again, the shots that are composed again, each with one
-    of its positions, and whether rays are cast (None: where embreex is installed).
+    """The positions to recompute labels for and to repaint, the shots to recompose, each with one of its positions, and whether
+    to cast rays (None: if embreex is installed).
     """
 
     computed: range
@@ -41,7 +41,7 @@ class Chosen:
 
 
 def frame_report(dataset: Dataset, chosen: Chosen, positions: range, recomputed: Recomputed | None = None) -> Report:
-    """The findings in the frames at these positions; `recomputed` has the plans of the recipes if they are known."""
+    """The findings in the frames at these positions; `recomputed` has the recipes' plans, if known."""
     proofs = _Proofs(dataset, chosen, recomputed or Recomputed(dataset))
     for position, index, read in _frames(dataset, positions):
         if isinstance(read, Sample):
@@ -53,7 +53,7 @@ def frame_report(dataset: Dataset, chosen: Chosen, positions: range, recomputed:
 
 
 class _Proofs:
-    """Proves frames one after another; what several need is kept."""
+    """Proves frames one after another; caches shared values."""
 
     def __init__(self, dataset: Dataset, chosen: Chosen, recomputed: Recomputed) -> None:
         self.findings: list[Finding] = []
@@ -78,12 +78,12 @@ class _Proofs:
             yield from self._by_painting(sample)
 
     def count(self, name: str, frame: int, messages: Iterable[str]) -> None:
-        """Note that a proof looked at a frame, and its findings."""
+        """Record that a proof checked a frame, with its findings."""
         self._checked.setdefault(name, {})[frame] = None
         self.findings += (Finding(name, frame, message) for message in messages)
 
     def report(self) -> Report:
-        """The outcome so far."""
+        """The report so far."""
         not_run = self._not_run | self._recomputed_labels.not_run
         if self._chosen.rays is False:
             not_run["surface"] = "no rays were asked for"
@@ -97,7 +97,7 @@ class _Proofs:
         return Report(checked, tuple(self.findings), not_run=not_run)
 
     def _by_models(self, sample: Sample) -> Iterator[tuple[str, list[str]]]:
-        """A frame's labels, computed again, and what Embree sees."""
+        """The comparison of a frame with recomputed labels and with Embree's rays."""
         if self._recomputed_labels.is_possible(sample):
             try:
                 for name, message in self._recomputed_labels.differences(sample):
@@ -108,7 +108,7 @@ class _Proofs:
             yield "surface", _carried_out(partial(self._caster.off_surface, sample))
 
     def _by_recipe(self, position: int, sample: Sample) -> Iterator[tuple[str, list[str]]]:
-        """The shots of a frame, composed again with one of their frames."""
+        """The comparison of a frame's shots with recomposed ones; each shot is recomposed with one of its frames."""
         for row in rows_of(self._dataset.plan, sample.index):
             if self._chosen.composed.get(row.key) == position:
                 messages = _carried_out(partial(self._recomputed.of_shot, row))
@@ -116,7 +116,7 @@ class _Proofs:
                     yield "recipe", messages
 
     def _by_painting(self, sample: Sample) -> Iterator[tuple[str, list[str]]]:
-        """A frame's pictures and passes, painted again."""
+        """The comparison of a frame's pictures and passes with repainted ones."""
         before = self._repainted.frames
         messages = _carried_out(partial(self._repainted.differences, sample))
         if messages or self._repainted.frames > before:
@@ -166,9 +166,9 @@ def _is_kept(dataset: Dataset, name: str) -> bool:
 
 
 def _proofs(models: Mapping[str, ModelInfo], sample: Sample) -> Iterator[tuple[str, list[str]]]:
-    """Every check of one frame against itself and what it found; a proof that cannot be carried out counts as failed."""
+    """Every check of one frame against itself, with its findings; a proof that breaks off counts as failed."""
     proofs: dict[str, Callable[[], Iterable[str]]] = {name: partial(proof, sample) for name, proof in FRAME_PROOFS.items()}
-    following = on_request().keys() - sample.requested  # of these nothing is kept, so nothing can be wrong
+    following = on_request().keys() - sample.requested  # nothing is stored for these, so nothing can be wrong
     kept = {name: label for name, label in labels().items() if name not in following and label.is_in(sample)}
     proofs |= {name: partial(label.prove, sample, models) for name, label in kept.items()}
     for name, proof in proofs.items():
@@ -192,9 +192,9 @@ def _as_shot(dataset: Dataset, scenery: Scenery, sample: Sample) -> Iterator[str
 
 
 def _dealt_split(dataset: Dataset, row: Row, sequence: str) -> tuple[str, str | None]:
-    """The name that deals a row its split (its sequence, model or scene), and that split; None where it is drawn otherwise.
+    """The name that decides a row's split (its sequence, model or scene), and that split; None if it is drawn differently.
 
-    A part keeps the splits of earlier ones; a merged part has its own alone.
+    A part keeps the splits of earlier parts; a merged part has only its own.
     """
     part = dataset.plan.parts[row.part]
     deals = [part_of_plan.dealt_splits for part_of_plan in ((part,) if part.merged else dataset.plan.parts[: row.part + 1])]
@@ -245,5 +245,5 @@ def _is_same_camera(one: Camera | None, other: Camera) -> bool:
 
 
 def _unnumbered(pose: Viewpoint) -> Viewpoint:
-    """Merged data sets number poses anew."""
+    """The viewpoint without its number, because merged data sets renumber poses."""
     return pose.model_copy(update={"index": 0})

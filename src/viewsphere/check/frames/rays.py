@@ -1,4 +1,4 @@
-"""An independent witness: Embree casts rays at the exported models, read back by trimesh, and at the scenery, made anew."""
+"""An independent check: Embree casts rays at the exported models, read by trimesh, and at the remade scenery."""
 
 from __future__ import annotations
 
@@ -28,25 +28,25 @@ from viewsphere.truth.raster.visibility import EDGE_ON
 Float = NDArray[np.float64]
 
 PIXELS = 5000
-"""Pixels of a frame that are cast at objects, spread evenly over them; as many at what is background."""
+"""Number of rays per frame at objects, spread evenly over their pixels, and also at the background."""
 
 TOLERANCE = 1e-4
 """Share of the distance by which Embree's float32 and the stored depth may differ."""
 
 LEVEL = 1e-5
-"""Slope of a ray, and metres above the ground, up to which rounding decides whether they meet."""
+"""Slope of a ray, and height above the ground in metres, up to which rounding decides whether ray and ground meet."""
 
 BEYOND = 1e-6
-"""Share of the distance, and of a metre, by which a ray goes on behind a back: some roundings of Embree's float32."""
+"""Share of the distance, and of a metre, by which a ray restarts behind a back face: a few rounding errors of float32."""
 
 OUTLIERS = 0.01
-"""Share of the pixels that may differ: where a ray passes within rounding of a triangle's edge, or meets it at a glance."""
+"""Share of the pixels that may differ, where a ray meets a triangle at a grazing angle or within rounding of its edge."""
 
 
 @dataclass(frozen=True, eq=False)
 class _Soup:
-    """Triangles (T, 3, 3) of one thing, which of them cannot be seen through (T,) bool, and which a camera sees from their
-    fronts alone (T,) bool.
+    """Triangles (T, 3, 3) of one thing, with masks (T,) bool of the opaque ones and of those that cameras see only from the
+    front.
     """
 
     corners: Float
@@ -56,7 +56,7 @@ class _Soup:
 
 @dataclass(frozen=True, eq=False)
 class _Target:
-    """A scene of Embree, and of its triangles the normals (T, 3) of single-sided ones, else 0."""
+    """A scene of Embree, and normals (T, 3) of its single-sided triangles, 0 for the others."""
 
     scene: Any
     fronts: Float
@@ -65,7 +65,7 @@ class _Target:
 class RayCaster:
     """Casts rays at a data set's scenes; the last one is kept, because frames of one scene follow one another.
 
-    Scenery that is background is made again from what its shot says of it; where that cannot be, only objects are looked at.
+    Background scenery is remade from its shot; if that fails, only objects are checked.
     """
 
     def __init__(self, dataset: Dataset, scenery: Scenery) -> None:
@@ -87,9 +87,9 @@ class RayCaster:
     def off_surface(self, sample: Sample) -> Iterator[str]:
         """Yield the contradictions between stored depth and instances, and the models as Embree sees them.
 
-        Each point must lie on the right object, and no opaque surface may be in front of it. A point of the background must
-        lie on scenery or the ground, which is at the lowest point of all (or lower, if the shot sets this). Through empty
-        pixels nothing may be visible, the ground neither.
+        Each point must be on the right object, and no opaque surface may be in front of it. A point of the background must be
+        on scenery or the ground, which is at the lowest point of all (or lower, if the shot sets this). Empty pixels must show
+        nothing, not even the ground.
         """
         if not sample.objects:
             return
@@ -106,7 +106,7 @@ class RayCaster:
             yield from self._off(sample, rays, step, rest, "points of the background are not where scenery and ground are")
 
     def _off(self, sample: Sample, rays: Float, rounded: float, asked: NDArray[np.bool_], what: str) -> Iterator[str]:
-        """Findings at the pixels asked for, whose depth was rounded by so many metres at most."""
+        """Findings at the selected pixels, whose depth was rounded by at most `rounded` metres."""
         rows, columns = np.nonzero(asked)
         if not len(rows):
             return
@@ -138,17 +138,18 @@ class RayCaster:
             )
 
     def _nearest(self, origins: Float, directions: Float) -> tuple[Float, NDArray[np.int64]]:
-        """Distance along each ray (infinite where nothing is hit) and whose the surface is, 0 for scenery's, -1 for none."""
+        """Distance along each ray (infinite if nothing is hit) and the id of the hit object, 0 for scenery, -1 for none."""
         (solid, i), (clear, k) = _cast(self._solid, origins, directions), _cast(self._clear, origins, directions)
         of_solid, of_clear = (np.append(own, -1)[which] for own, which in zip(self._owners, (i, k), strict=True))
         return np.minimum(solid, clear), np.where(clear < solid, of_clear, of_solid)
 
     def _is_in_ground(self, eye: Float) -> bool:
-        """Return whether the camera stands in the plane of the ground, of which it then sees nothing."""
+        """Return whether the camera is in the plane of the ground, where it sees no ground."""
         return abs(eye[2] - self._lowest) <= EDGE_ON * (1.0 + float(np.linalg.norm(eye + self._middle)))
 
     def _meets_ground(self, eye: Float, directions: Float, ahead: NDArray[np.bool_]) -> NDArray[np.bool_]:
-        """Return a mask of the rays that certainly meet the ground; not all files keep the depth of rays that look back."""
+        """Return a mask of the rays that certainly meet the ground; not all files store the depth of rays that point backwards.
+        """
         height = eye[2] - self._lowest
         steep = np.abs(directions[:, 2]) > LEVEL
         return ahead & steep & (directions[:, 2] * height < 0) & (abs(height) > LEVEL) & self._has_ground
@@ -187,7 +188,7 @@ class RayCaster:
         return soup
 
     def _remade(self, record: SceneryRecord, thing: Thing) -> _Soup | None:
-        """A piece of scenery, None where it is not what it was."""
+        """A piece of scenery, None if it has changed."""
         digest = record.digests[thing.key]
         if digest not in self._around:
             mesh = self._scenery.mesh(record, thing)

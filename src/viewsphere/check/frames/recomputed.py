@@ -1,4 +1,4 @@
-"""The plan and the shots that a data set's own recipes give, compared whole with those that it holds."""
+"""The plan and the shots from a data set's own recipes, compared completely with the stored ones."""
 
 from __future__ import annotations
 
@@ -29,23 +29,23 @@ from viewsphere.store import Dataset, PlanRecord, Row, kept_shot
 from viewsphere.store.texts import parsed
 
 FILE = re.compile(r"[*?/\\]|\.\w{2,8}$")
-"""Occurs in names of files and patterns, and in no other text of a recipe that changes its plan."""
+"""Matches names of files and patterns, but no other text of a recipe that affects its plan."""
 
 FREE = ("name", "licence", "attribution", "source_url", "category", "supercategory")
 """Fields of a recipe whose texts may be anything."""
 
 BY_FILES = re.compile(r"(^|\.)(models|blocks|poses|frames|new_poses|pose_names)\b|images|script")
-"""Occurs in fields of a plan that follow from the names of files, and from tables of poses."""
+"""Matches fields of a plan that follow from the names of files and from tables of poses."""
 
 MOST_SUBJECTS = 200
-"""Models or scenes of a part whose files are looked for."""
+"""Number of models or scenes of a part whose files are looked for."""
 
 CONTRADICTED = "the plan contradicts its recipe"
-"""The reason why nothing more is made by a recipe."""
+"""The reason for not using a recipe further."""
 
 
 def rows_of(plan: PlanRecord, frame: int) -> Iterator[Row]:
-    """The rows of the shots that hold a frame: its own, then those that add channels to it."""
+    """The rows of the shots that contain a frame: its own shot, then the shots that add channels to it."""
     yield plan.row_at(frame)
     for index, _ in plan.supplements:
         if index.first <= frame < index.first + index.samples:
@@ -76,14 +76,14 @@ class Recomputed:
         return in_short(self.why_not.values())
 
     def composer(self, number: int) -> Composer | None:
-        """The composer of a part's shots; None where its recipe cannot be planned, or gives another plan."""
+        """The composer of a part's shots; None if its recipe cannot be planned or gives a different plan."""
         if number not in self._composers:
             portion = self._portion(number)
             self._composers[number] = portion and Composer(portion, StoredBoxes(self._dataset.store), self.stages)
         return self._composers[number]
 
     def of_plan(self) -> Iterator[str]:
-        """Differences of plan.json from the plan that its recipes give together, and contradictions inside of it."""
+        """Differences between plan.json and the combined plan of its recipes, and contradictions within plan.json."""
         yield from _inside(read_text(self._dataset.store.plan_file, "MAX_RECORD_BYTES"), self._record)
         portions = [self._portion(number) for number in range(len(self._record.parts))]
         yield from (message for messages in self.refused.values() for message in messages)
@@ -91,7 +91,7 @@ class Recomputed:
             yield from in_words(self._against(len(portions)), "plan.json", "the recipe")
 
     def of_shot(self, row: Row) -> Iterator[str]:
-        """Differences of a stored shot, and of its background, from those that the recipe gives."""
+        """Differences of a stored shot and its background from the recipe's."""
         composer = self.composer(row.part)
         if composer is None:
             return
@@ -129,7 +129,7 @@ class Recomputed:
         return None
 
     def _lacks_files(self, number: int) -> bool:
-        """Return whether a recipe names files that may be gone: others than models', or a model's that is no longer there."""
+        """Return whether a recipe names files that may be missing: files other than models', or a missing model file."""
         recipe, store = self._record.parts[number].recipe, self._dataset.store
         if _names_files({name: value for name, value in recipe.items() if name != "models"}):
             return True
@@ -140,7 +140,7 @@ class Recomputed:
         return not all(prefix_of(source) or split_source(Path(source))[0].exists() for source in sources)
 
     def _judge(self, number: int, planned: Plan) -> None:
-        """Note whether a part contradicts its recipe, or files that the recipe names changed since."""
+        """Record whether a part contradicts its recipe, or whether files named by the recipe have changed."""
         contradictions = tuple(self._against(number, planned))
         beside = [path for path, _, _ in contradictions if not path.endswith("digest") and not path.startswith("recipe")]
         by_files = any(map(BY_FILES.search, beside)) or (not beside and _reads_tables(planned))
@@ -150,7 +150,7 @@ class Recomputed:
             self.refused[number] = tuple(in_words(iter(contradictions), "plan.json", "the recipe"))
 
     def _against(self, number: int, last: Plan | None = None) -> Iterator[Difference]:
-        """Differences of the data set's plan from that of so many recipes, and a `last` one, appended to one another."""
+        """Differences of the data set's plan from the combined plan of the first `number` recipes and a `last` one."""
         record = NOTHING
         for planned in [*map(self.replanned.plan, range(number)), *([last] if last else [])]:
             record = extend(planned, record).record
@@ -170,7 +170,7 @@ def _names_files(recipe: Any) -> bool:
 
 
 def _reads_tables(planned: Plan) -> bool:
-    """Return whether a plan follows from what files say, such as tables of poses and calibrations."""
+    """Return whether a plan follows from the content of files, such as tables of poses and calibrations."""
     path = getattr(planned.recipe.viewpoints, "path", None)
     read = (path, planned.blend, planned.own_rig, planned.tracks, script_digest(planned.recipe))
     return any(table is not None for table in read)

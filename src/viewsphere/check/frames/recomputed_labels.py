@@ -1,4 +1,4 @@
-"""Labels recomputed from the exported models and their stored places, and compared with the stored labels."""
+"""Labels recomputed from the exported models and their stored poses, and compared with the stored labels."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from viewsphere.store import Dataset, ModelInfo, depth_step
 from viewsphere.store.samples.channel_files import MOST_STEPS
 
 Findings = Iterator[tuple[str, str]]
-"""Names of labels, and what is wrong with them."""
+"""Names of labels, with their errors."""
 
 
 class RecomputedLabels:
@@ -38,7 +38,7 @@ class RecomputedLabels:
         self.not_run: dict[str, str] = {}
 
     def is_possible(self, sample: Sample) -> bool:
-        """Return whether it is known what was seen."""
+        """Return whether a sample's view can be reconstructed."""
         return self._reconstructor.is_possible(sample)
 
     def differences(self, sample: Sample) -> Findings:
@@ -55,7 +55,7 @@ class RecomputedLabels:
         yield from _of_picture(sample.extra, sample_values(context, objects))
 
     def _computed(self, label: ChannelLabel, context: LabelContext) -> NDArray[Any] | None:
-        """A channel, computed again; None where a picture of the scene is no longer there: it is no part of the data set."""
+        """A recomputed channel; None if a picture of the scene, which is not part of the data set, no longer exists."""
         try:
             return computed_channel(label, context)
         except RecipeError as error:
@@ -71,7 +71,7 @@ class RecomputedLabels:
         except ViewsphereError:
             return
         if kept.shape != again.shape:
-            if kept.dtype.names:  # of rows nothing else says how many there are
+            if kept.dtype.names:  # nothing else gives the number of rows
                 yield f"expected {len(again):,} rows, found {len(kept):,}"
             return
         step = depth_step(self._dataset.read(sample.files[name])) if channel_labels()[name].in_steps else 0.0
@@ -86,7 +86,9 @@ class RecomputedLabels:
 
 
 def unequal(kept: NDArray[Any], again: NDArray[Any]) -> NDArray[np.bool_]:
-    """(H, W): where any component differs; NaN equals itself. Of rows (N,): which differ in any byte."""
+    """A mask (H, W): True where any component differs; NaN equals itself. For rows a mask (N,) of those that differ in any
+    byte.
+    """
     if kept.dtype.names:
         return (_bytes(kept) != _bytes(again)).any(axis=1)
     different = kept != again
@@ -101,7 +103,8 @@ def _bytes(rows: NDArray[Any]) -> NDArray[np.uint8]:
 
 
 def _beyond(kept: NDArray[Any], again: NDArray[Any], step: float) -> NDArray[np.bool_]:
-    """(H, W): where a depth kept in whole steps is not the nearest one; what is behind the camera is kept as nothing."""
+    """A mask (H, W) of depths stored in whole steps that are not the nearest step; depth behind the camera is stored as empty.
+    """
     seen = np.isfinite(again) & (again > 0)
     rounded = np.clip(np.rint(np.where(seen, again, 1.0).astype(np.float64) / step), 1, MOST_STEPS)
     return np.where(seen, kept != (rounded * step).astype(np.float32), np.isfinite(kept))

@@ -1,4 +1,4 @@
-"""Frames painted again by the recipe, and compared with the stored pictures and passes."""
+"""Frames repainted from the recipe, and compared with the stored pictures and passes."""
 
 from __future__ import annotations
 
@@ -25,17 +25,19 @@ from viewsphere.store import Dataset, Row, decode, encode
 from viewsphere.store.shots.manifest import Manifest
 
 STEP = 1
-"""Levels of 8 bits by which another processor may paint: rounding of float32 sums falls to the other side of a half."""
+"""Difference in 8-bit levels allowed on another processor, where float32 sums near a half round the other way."""
 
 SHARE = 2.0**-10
-"""Share of a pass' value by which another processor may paint: the precision of half floats, a step of an 8-bit picture."""
+"""Relative difference of a pass allowed on another processor: the precision of half floats, or a step of an 8-bit picture."""
 
 LOSSY_STEPS = 4
-"""Levels by which a lossy file may differ where its picture differs by one: a block's rounding is coarser at high quality."""
+"""Levels by which a lossy file may differ if its picture differs by one: the rounding of a block is coarser at high quality."""
 
 
 class Repainted:
-    """Paints frames of a data set again, and counts them in `frames`; `why_not` has the reason for each part that cannot be."""
+    """Repaints frames of a data set and counts them in `frames`; `why_not` has the reason for each part that cannot be
+    repainted.
+    """
 
     def __init__(self, dataset: Dataset, recomputed: Recomputed) -> None:
         self.frames = 0
@@ -43,7 +45,7 @@ class Repainted:
         self._dataset, self._recomputed = dataset, recomputed
 
     def differences(self, sample: Sample) -> Iterator[str]:
-        """Pictures and passes of a sample that are not those painted again."""
+        """Pictures and passes of a sample that differ from the repainted ones."""
         before = dict(self.why_not)
         for row in rows_of(self._dataset.plan, sample.index):
             yield from self._of_row(row, sample)
@@ -74,7 +76,7 @@ class Repainted:
                 yield from _compared(name, painted.channels[name], sample, shot.files, tolerant)
 
     def _painted(self, shot: Shot, number: int) -> Sample:
-        """The sample of a number, which is painted with the others of its instant, and no more."""
+        """The sample of a number, painted together with only the other samples of its instant."""
         instant, sensor = next((instant, sensor) for place, instant, sensor in shot.samples if place == number)
         instants = (now.model_copy(update={"recorded": i == instant}) for i, now in enumerate(shot.instants))
         alone = shot.model_copy(update={"instants": tuple(instants), "first": number - sensor})
@@ -82,7 +84,7 @@ class Repainted:
 
 
 def _compared(name: str, painted: NDArray[Any], sample: Sample, files: Files, tolerant: bool) -> Iterator[str]:
-    """The difference of a stored channel from the one painted again, which is written and read as the stored one was."""
+    """The difference of a stored channel from the repainted one, which is written and read in the same way."""
     channel = channels()[name]
     wanted, found = decode(channel, Path(name), lambda: encode(channel, painted, files)), sample.channels[name]
     if wanted.shape != found.shape:
@@ -98,7 +100,7 @@ def _compared(name: str, painted: NDArray[Any], sample: Sample, files: Files, to
 
 
 def _beyond(found: NDArray[Any], wanted: NDArray[Any], is_lossy: bool) -> NDArray[np.bool_]:
-    """(H, W): where any component differs by more than another processor may make it."""
+    """A mask (H, W): True where any component differs by more than another processor allows."""
     if np.issubdtype(found.dtype, np.integer):
         most = LOSSY_STEPS if is_lossy else STEP
         return unequal(np.abs(found.astype(np.int64) - wanted) > most, np.zeros(found.shape, np.bool_))

@@ -1,4 +1,4 @@
-"""Proof that models' records are what their sources give: made again, and compared whole."""
+"""Proof that models' records follow from their sources, which are read again and compared completely."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ Finding = tuple[str, str]
 
 
 class Sources:
-    """Makes models of a data set again; `why_not` has the reason for each that cannot be, by its key."""
+    """Remakes models of a data set; `why_not` has the reason for each model that cannot be remade, by its key."""
 
     def __init__(self, dataset: Dataset, recomputed: Recomputed) -> None:
         self.why_not: dict[str, str] = {}
@@ -42,14 +42,14 @@ class Sources:
         return credits_problem(self._dataset) is None
 
     def contradictions(self, keys: Iterable[str]) -> Iterator[Finding]:
-        """Differences of the records of these models from those made again."""
+        """Differences of the records of these models from the remade ones."""
         for key in keys:
             info = self._dataset.store.model_info(key)
             if info is not None:
                 yield from ((key, message) for message in self._of_model(info))
 
     def excuse(self, key: str, reason: str) -> Iterator[str]:
-        """The contradiction where a model was left out for this reason, and its source gives no error, or another."""
+        """The contradiction if a model was left out for this reason, but its source gives no error or a different one."""
         _, spec = self._spec(key)
         if spec is None:
             return
@@ -80,7 +80,7 @@ class Sources:
         yield from in_words(differences(wanted, found), f"model {info.key}: model.json", "its source")
 
     def _spec(self, key: str) -> tuple[int, ModelSpec | None]:
-        """The number of the last part that has a model, and the model; None where no recipe that can be planned has it."""
+        """The number of the last part that has a model, and the model; None if no recipe that can be planned has it."""
         for number in reversed(range(len(self._dataset.plan.parts))):
             if self._recomputed.composer(number) is not None:
                 spec = self._recomputed.replanned.models(number).get(key)

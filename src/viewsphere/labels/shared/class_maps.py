@@ -1,4 +1,4 @@
-"""The colours, the other ids and the contradictions that maps of classes share."""
+"""The code that maps of classes share: colours, renumbering and proofs."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def class_names() -> str:
 
 
 def with_classes(classes: Array, ids: Mapping[int, int]) -> Array:
-    """Classes where categories have other ids."""
+    """Classes with new ids for categories."""
     return by_table(classes, {thing_class(old): thing_class(new) for old, new in ids.items()})
 
 

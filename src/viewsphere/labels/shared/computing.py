@@ -1,4 +1,4 @@
-"""Labels of a picture, computed from truth. This module loads the rasterizer, so modules that only name labels avoid it."""
+"""The computation of a picture's labels. This module loads the rasterizer, so modules that only name labels avoid it."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ def observe(
 
 
 def computed_channel(label: ChannelLabel, context: LabelContext) -> NDArray[Any]:
-    """A label of pixels; it may read only the inputs that it needs."""
+    """A label of pixels, computed with access only to the inputs in its `needs`."""
     return label.compute(context.read_by(label))
 
 
@@ -67,7 +67,7 @@ def context_of(
     neighbours: NeighbourViews | None = None,
     metadata: Sequence[Callable[[], ModelMetadata]] | None = None,
 ) -> LabelContext:
-    """Return the view that a camera has of a shot at an instant (counted from 0 there), with the places of its objects.
+    """Return the view of a shot by a camera at an instant (counted from 0 in the shot), with the placements of its objects.
 
     `boxes[i]` is the 3D box (8, 3) of object i + 1's model at that instant, in the object's axes. `models[i]` is the path of
     that model in the data set. `real_sizes[i]` is its true size, by default the size that its spec gives in numbers.
@@ -100,7 +100,7 @@ def _unsaid() -> ModelMetadata:
 
 
 def _track(thing: Thing, instant: int) -> str:
-    """The key of the thing's model where it shows a time step, else empty."""
+    """The key of the thing's model if it shows a time step, else empty."""
     return thing.model.key if thing.motion.step_at(instant) else ""
 
 
@@ -119,7 +119,7 @@ def annotated(context: LabelContext) -> tuple[ObjectAnnotation, ...]:
 
 
 def sample_values(context: LabelContext, objects: Sequence[ObjectAnnotation]) -> Mapping[str, Any]:
-    """The fields of the labels of whole pictures that were asked for; `objects` are `annotated(context)`."""
+    """The fields of the requested labels of whole pictures; `objects` are `annotated(context)`."""
     found: dict[str, Any] = {}
     for label in sample_labels_of(context.requested):
         found |= label.compute(context.read_by(label), objects)
@@ -147,7 +147,7 @@ class Rendered:
 
     @property
     def symmetries(self) -> Symmetries | None:
-        """Motions that leave the model as it is."""
+        """The symmetries of the model."""
         return self.metadata().symmetries
 
     @property

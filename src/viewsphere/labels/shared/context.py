@@ -1,4 +1,4 @@
-"""A camera's view of a geometry, with values shared by the labels of a picture, computed when first asked for."""
+"""A camera's view of a geometry, with values that the labels of a picture share, computed at the first access."""
 
 from __future__ import annotations
 
@@ -36,8 +36,8 @@ EVERYWHERE = (-math.inf, -math.inf, math.inf, math.inf)
 
 @dataclass(frozen=True, eq=False)
 class IsolatedMask:
-    """An object as the camera would see it alone, on a canvas of three times the image's width and height: 1/s (h, w) float32
-    of `truth.raster.visibility`, 0 where a pixel does not show it, from the pixel (left, top) on.
+    """An object as the camera would see it alone, on a canvas of three times the image's width and height. It stores 1/s (h, w)
+    float32 of `truth.raster.visibility`, 0 where a pixel does not show the object; its first pixel is at (left, top).
     """
 
     left: int
@@ -45,7 +45,7 @@ class IsolatedMask:
     inverse_depth: NDArray[np.float32]
 
     def in_image(self, width: int, height: int) -> IsolatedMask:
-        """The part of it that lies in the image."""
+        """The part of the mask inside the image."""
         x, y = max(-self.left, 0), max(-self.top, 0)
         return IsolatedMask(
             max(self.left, 0),
@@ -55,7 +55,7 @@ class IsolatedMask:
 
     @property
     def box(self) -> tuple[int, int, int, int]:
-        """The half-open box (x0, y0, x1, y1) that it fills, or more."""
+        """A half-open box (x0, y0, x1, y1) around the mask, not always tight."""
         rows, columns = self.inverse_depth.shape
         return self.left, self.top, self.left + columns, self.top + rows
 
@@ -74,9 +74,9 @@ class _Shared(Generic[Made]):
 class LabelContext:
     """The inputs that the labels of a picture share: a camera's view of a geometry, seen as `rasterize(geometry, camera)`.
 
-    `placements` belong to the objects 1, 2, ...; an absent object's is None; labels of pixels need no placements. `neighbours`
-    are views to compare the picture with; `requested` are names of annotations; `options` are those of labels, by their
-    names. `label` is the one that reads the context, and gets no inputs but its `needs`; None: all inputs.
+    `placements` belong to the objects 1, 2, ...; they are None for absent objects, and labels of pixels need none. `neighbours`
+    are views to compare the picture with; `requested` are names of annotations; `options` are the labels' options by name.
+    `label` is the label that reads the context, which gets only the inputs in its `needs`; None: all inputs.
     """
 
     geometry: Geometry
@@ -102,8 +102,8 @@ class LabelContext:
         return replace(self, label=label)
 
     def get(self, need: Need[NeedT]) -> NeedT | None:
-        """Return the input that a need stands for; None for a picture without neighbours. Raises PluginError for a need that
-        the label does not list.
+        """Return the input that a need describes; None for a picture without neighbours. Raises PluginError for a need that the
+        label does not list.
         """
         self._check(need)
         return need.read(self.neighbours) if self.neighbours else None
@@ -114,8 +114,8 @@ class LabelContext:
 
     @property
     def own_view(self) -> View | None:
-        """The picture's own view, which points of other views are compared with; None for a picture without neighbours. Labels
-        have it if they need anything.
+        """The picture's own view, to compare with points of other views; None for a picture without neighbours. Every label
+        with any need has access to it.
         """
         if self.label is None or not self.label.needs:
             self._check(OwnView())
@@ -130,7 +130,7 @@ class LabelContext:
         return self._matches[need]
 
     def options_of(self, name: str, kind: type[OptionsT]) -> OptionsT:
-        """The options of a label, as their class reads them."""
+        """The options of a label, parsed by their class."""
         return kind.model_validate(self.options.get(name, {}))
 
     @property
@@ -161,12 +161,12 @@ class LabelContext:
 
     @property
     def inverse_depth(self) -> NDArray[np.float64]:
-        """1/s of what is seen, (H, W), before it was rounded, if that is known; 0 where nothing is seen."""
+        """1/s of the seen points, (H, W), unrounded if available; 0 where nothing is seen."""
         return self.visibility.inverse_depth.astype(np.float64) if self.visibility.exact is None else self.visibility.exact
 
     @property
     def instances(self) -> Instances:
-        """The object that each pixel shows, and area and box of each object's visible pixels."""
+        """The object at each pixel, and the area and box of each object's visible pixels."""
         return self.visibility.instances(self.geometry)
 
     @_Shared
@@ -184,11 +184,11 @@ class LabelContext:
 
     def is_unobstructed(self, i: int) -> bool:
         """Return whether nothing can hide any part of the object of id i + 1: its 2D box meets no other object's box, there
-        is no scenery, and the ground cannot lie before it.
+        is no scenery, and the ground cannot be in front of it.
         """
         geometry = self.geometry
         if geometry.has_scenery:
-            return False  # a street's box meets all others: to look at scenery's boxes would cost more than it saves
+            return False  # a street's box meets all others, so testing scenery's boxes would cost more than it saves
         own = self.projected[i][0]
         if own is not None:
             (left, top, right, bottom), (x0, y0, x1, y1) = own, self._reaches.T
@@ -200,8 +200,8 @@ class LabelContext:
 
     @_Shared
     def _reaches(self) -> NDArray[np.float64]:
-        """For each object the 2D box, (N, 4), beyond which it hides nothing: everywhere where the lens does not show all of it,
-        nowhere (NaN) for an object that is behind the camera.
+        """For each object the 2D box, (N, 4), beyond which it hides nothing. It is unbounded if the lens does not show all of
+        the object, and NaN for an object behind the camera.
         """
         boxes = (NOWHERE if box is None else box if whole else EVERYWHERE for box, whole in self.projected)
         return np.array([*boxes], np.float64).reshape(-1, 4)
@@ -238,7 +238,8 @@ class LabelContext:
         return np.empty(shape if components == 1 else (*shape, components), dtype)
 
     def per_triangle(self, table: NDArray[np.int32], empty: int) -> NDArray[np.int32]:
-        """An int32 channel: the table's number for the triangle seen, 0 beyond its end, `empty` where nothing is seen."""
+        """An int32 channel: the table's number for the seen triangle, 0 beyond the table's end, `empty` where nothing is seen.
+        """
         from viewsphere.truth.raster import kernels_channels as kernels
 
         out = self.empty(np.int32)

@@ -1,4 +1,4 @@
-"""A field of a label: what its values are, and how they become plain JSON data and come back."""
+"""A field of a label: the type of its values, and their conversion to plain JSON data and back."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from viewsphere.labels.shared.ids import Ids, check_ids, is_of_numbers
 
 @dataclass(frozen=True)
 class Field:
-    """One field of an object or of a picture: a number, a text or a plain dataclass of these and of tuples of numbers (`shape`
-    is empty), a tuple of numbers, or an array, whose `shape` has -1 where any length will do. `many` is a tuple of any number
-    of such values. `optional`: None says that there is no such value.
+    """One field of an object or of a picture. With an empty `shape` it is a number, a text, or a plain dataclass of these and
+    of tuples of numbers. Otherwise it is a tuple of numbers or an array, whose `shape` has -1 where any length is allowed.
+    `many` means a tuple of any number of such values. `optional` allows None for a missing value.
 
-    `ids` are the kinds of ids in a value, each with a function that gives the value with other ones. Whole numbers have to
-    declare them; raises ValueError for those that do not.
+    `ids` are the kinds of ids in a value, each with a function that replaces them. Fields of whole numbers must declare `ids`;
+    raises ValueError for those that do not.
     """
 
     name: str
@@ -56,7 +56,7 @@ class Field:
         return _without_nan(list(value) if isinstance(value, tuple) else value)
 
     def value(self, plain: Any) -> Any:
-        """The value that `plain` was made of, to the last bit."""
+        """The value that `plain` was made from, to the last bit."""
         value = tuple(map(self._value, plain)) if plain is not None and self.many else self._value(plain)
         self.check(value)
         return value
@@ -76,7 +76,7 @@ class Field:
         return plain
 
     def check(self, value: Any) -> None:
-        """Raise ValueError for a value that the field cannot have; NaN stands for numbers that are not known."""
+        """Raise ValueError for a value that the field cannot have; NaN means an unknown number."""
         if value is None and self.optional:
             return
         if not (isinstance(value, tuple) and all(map(self._is_right, value)) if self.many else self._is_right(value)):
@@ -107,7 +107,7 @@ class Field:
 
 
 def _is_part(value: Any, kind: str) -> bool:
-    """Return whether a value is what a dataclass's field holds: a text, numbers or a number."""
+    """Return whether a value fits a field of a dataclass: a text, numbers or a number."""
     if kind.startswith("tuple"):
         return isinstance(value, tuple) and all(map(_is_number, value))
     return isinstance(value, str) if kind == "str" else _is_number(value)
@@ -128,7 +128,7 @@ def _is_number(value: Any) -> bool:
 
 
 _GREATEST = 1e300
-"""A number above it is a mistake."""
+"""A number above this limit is an error."""
 
 
 def _without_nan(value: Any) -> Any:

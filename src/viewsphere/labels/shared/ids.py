@@ -1,4 +1,4 @@
-"""The ids that a label's data hold, and how each kind gets other numbers where data sets are joined.
+"""The ids in a label's data, and the renumbering of each kind of id when data sets are joined.
 
 A label declares the kinds of ids in its data together with their renumbering, so that none can be left out: whole numbers
 without a declaration are refused when the label is loaded.
@@ -14,13 +14,13 @@ import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
 IdKind = Literal["category", "object", "part"]
-"""Ids of a data set's categories, of a shot's objects, and of what one model has: parts, materials, triangles."""
+"""Ids of a data set's categories, of a shot's objects, and of a model's parts, materials and triangles."""
 
 Table = Mapping[int, int]
-"""New ids by their old ones."""
+"""New ids by old ids."""
 
 Renumber = Callable[[Any, Table], Any]
-"""Gives data with the ids of one kind replaced; the data are only read."""
+"""Returns data with the ids of one kind replaced; does not change its argument."""
 
 Ids = Mapping[IdKind, Renumber]
 """The kinds of ids in some data, each with its renumbering."""
@@ -45,12 +45,12 @@ def in_column(name: str, renumber: Renumber = by_table) -> Renumber:
 
 
 def by_number(value: int | tuple[int, ...], ids: Table) -> int | tuple[int, ...]:
-    """A number, or several, with other ids for those that have one."""
+    """A number or several numbers, with new ids for those in the table."""
     return tuple(ids.get(one, one) for one in value) if isinstance(value, tuple) else ids.get(value, value)
 
 
 def in_attributes(*names: str) -> Renumber:
-    """The renumbering of some attributes of a dataclass, or of each of several."""
+    """The renumbering of some attributes of a dataclass, or of several dataclasses."""
 
     def renumbered_parts(value: Any, ids: Table) -> Any:
         if isinstance(value, tuple):
@@ -61,7 +61,7 @@ def in_attributes(*names: str) -> Renumber:
 
 
 def renumbered(value: Any, ids: Ids | None, tables: Mapping[IdKind, Table]) -> Any:
-    """The value where the kinds of ids in `tables` have other numbers; itself where it holds none of these kinds."""
+    """The value with the ids of the kinds in `tables` renumbered; unchanged if it has none of these kinds."""
     for kind, table in tables.items():
         if value is not None and ids and kind in ids:
             value = ids[kind](value, table)
@@ -69,7 +69,7 @@ def renumbered(value: Any, ids: Ids | None, tables: Mapping[IdKind, Table]) -> A
 
 
 def check_ids(where: str, ids: Ids | None, has_numbers: bool, example: str = "by_number") -> None:
-    """Raise ValueError for whole numbers without a declaration of the ids among them, and for kinds that do not exist."""
+    """Raise ValueError for whole numbers that do not declare their ids, and for unknown kinds of ids."""
     if ids is None and has_numbers:
         raise ValueError(
             f"{where} holds whole numbers, and does not declare the ids among them. Set "
@@ -83,7 +83,7 @@ def check_ids(where: str, ids: Ids | None, has_numbers: bool, example: str = "by
 
 
 def has_whole_numbers(dtype: DTypeLike) -> bool:
-    """Return whether arrays of a type hold whole numbers, in a column at least."""
+    """Return whether arrays of a type hold whole numbers, in at least one column."""
     kind = np.dtype(dtype)
     if kind.fields:
         return any(has_whole_numbers(column) for column, *_ in kind.fields.values())
@@ -91,7 +91,7 @@ def has_whole_numbers(dtype: DTypeLike) -> bool:
 
 
 def is_of_numbers(type_: Any) -> bool:
-    """Return whether values of a field's type are whole numbers, or dataclasses that hold some."""
+    """Return whether values of a field's type are whole numbers, or dataclasses that contain some."""
     if is_dataclass(type_):
         return any("int" in str(one.type) for one in fields(type_))
     return type_ is int

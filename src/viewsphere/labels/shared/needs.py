@@ -1,4 +1,4 @@
-"""The inputs of labels besides what the picture's own camera sees at its instant: `needs=(Next(1), Partner())`."""
+"""The inputs of labels in addition to the view of the picture's own camera at its instant: `needs=(Next(1), Partner())`."""
 
 from __future__ import annotations
 
@@ -25,13 +25,13 @@ class Need(ABC, Generic[T]):
     """An input of a label. `LabelContext.get` returns it to labels that list it in their `needs`."""
 
     SECTION: ClassVar[str] = ""
-    """The section of a recipe without which there is no such input; empty: all recipes provide it."""
+    """The section of a recipe that provides the input; empty: all recipes provide it."""
 
     PURPOSE: ClassVar[str] = ""
     """The part of an error message that describes the section."""
 
     IS_RECORDED: ClassVar[bool] = False
-    """Whether a data set provides it only where its recipe requested the label."""
+    """Whether a data set provides the input only if its recipe requested the label."""
 
     @abstractmethod
     def read(self, neighbours: NeighbourViews) -> T:
@@ -43,12 +43,12 @@ class Need(ABC, Generic[T]):
 
     @property
     def view_offset(self) -> int:
-        """The instant whose triangles are read, counted from the picture's own; 0: no other instant's."""
+        """The instant whose triangles are read, relative to the picture's own; 0: none but its own."""
         return 0
 
     @property
     def pose_offset(self) -> int:
-        """The instant whose poses are read, counted from the picture's own; 0: no other instant's."""
+        """The instant whose poses are read, relative to the picture's own; 0: none but its own."""
         return self.view_offset
 
 
@@ -59,7 +59,7 @@ class _OfTime(Need[T]):
 
 @dataclass(frozen=True)
 class Next(_OfTime["View | None"]):
-    """The view of the picture's own sensor so many instants later; None at the end of a sequence."""
+    """The view of the picture's own sensor a number of instants later; None at the end of a sequence."""
 
     instants: int = 1
 
@@ -75,13 +75,13 @@ class Next(_OfTime["View | None"]):
 
 @dataclass(frozen=True)
 class Previous(_OfTime["View | None"]):
-    """The view of the picture's own sensor so many instants earlier; None at the beginning of a sequence."""
+    """The view of the picture's own sensor a number of instants earlier; None at the beginning of a sequence."""
 
     instants: int = 1
 
     @property
     def view_offset(self) -> int:
-        """As many instants as the need names, below 0."""
+        """The number of instants of the need, as a negative number."""
         return -self.instants
 
     def read(self, neighbours: NeighbourViews) -> View | None:
@@ -91,7 +91,7 @@ class Previous(_OfTime["View | None"]):
 
 @dataclass(frozen=True)
 class Poses(_OfTime["Moment | None"]):
-    """Poses and cameras so many instants later, or earlier if below 0; None where the shot has no such instant."""
+    """Poses and cameras a number of instants later, or earlier if negative; None if the shot has no such instant."""
 
     instants: int
 
@@ -137,7 +137,7 @@ class OwnView(Need["View | None"]):
 
 
 class ObjectPoints(Need["Callable[[int], SurfacePoints]"]):
-    """Random points on the surfaces of objects: a function of their number on each object."""
+    """Random points on the surfaces of objects, as a function of the number of points per object."""
 
     def read(self, neighbours: NeighbourViews) -> Callable[[int], SurfacePoints]:
         """Return the function."""
@@ -170,7 +170,7 @@ class Scanner(Protocol):
         ...
 
     def turning(self, seconds: float) -> Turning:
-        """Return the motion of the scene while the columns of the picture are measured in turn, within so many seconds."""
+        """Return the motion of the scene during the given seconds, in which the columns of the picture are measured in turn."""
         ...
 
 
@@ -191,7 +191,7 @@ class LidarScan(Need[Scanner]):
 
 
 class Randomness(Need[tuple[str, ...]]):
-    """The names that, beside a seed, key the random values of the picture's labels."""
+    """The names that, together with a seed, determine the random values of the picture's labels."""
 
     def read(self, neighbours: NeighbourViews) -> tuple[str, ...]:
         """Return the names, for `viewsphere.labels.shared.randomness.generator`."""
@@ -199,7 +199,7 @@ class Randomness(Need[tuple[str, ...]]):
 
 
 class Scenery(Protocol):
-    """The shot of a picture, its sensor, and the settings by which light becomes the picture."""
+    """The shot of a picture, its sensor, and the settings that develop light into the picture."""
 
     @property
     def shot(self) -> Shot:
@@ -228,5 +228,5 @@ class ShotAppearance(Need[Scenery]):
 
 
 def requires(needs: tuple[Need[Any], ...], kind: type[Need[Any]]) -> bool:
-    """Return whether needs of a kind are among these."""
+    """Return whether any of these needs is of the kind."""
     return any(isinstance(need, kind) for need in needs)

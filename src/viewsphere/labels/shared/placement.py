@@ -40,7 +40,7 @@ class ModelFacts(Protocol):
 
     @property
     def real_size(self) -> Size | None:
-        """Its true size in metres; None if it is not known."""
+        """Its true size in metres; None if unknown."""
         ...
 
     @property
@@ -75,7 +75,7 @@ class ModelFacts(Protocol):
 
     @property
     def symmetries(self) -> Symmetries | None:
-        """Motions that leave it as it is."""
+        """Its symmetries."""
         ...
 
     @property
@@ -85,14 +85,14 @@ class ModelFacts(Protocol):
 
     @property
     def looks(self) -> Appearance | None:
-        """Its colours and materials; None where no requested label needs them."""
+        """Its colours and materials; None if no requested label needs them."""
         ...
 
 
 @dataclass(frozen=True, eq=False)
 class Placement:
     """One object in one picture: its model and pose (world from object), the camera, and the angular resolution of pose
-    categories. `known` returns the facts about its model at the time step that it shows, at the first access to `facts`.
+    categories. `known` returns the facts about its model at the shown time step; it is called at the first access to `facts`.
     """
 
     spec: ModelSpec
@@ -136,8 +136,8 @@ class Placement:
 def view_of(camera_from_object: Float, center: Float) -> ObjectView:
     """Orbit angles, distance and tilt of the camera around the point `center` (3,) of the object's own axes.
 
-    Azimuth is in [0, 360). Tilt is in [-180, 180]: the camera's roll once it is turned, by the shortest
-    way, to look at the point; so for a camera that looks at the point, the angles equal its viewpoint's.
+    Azimuth is in [0, 360). Tilt is in [-180, 180]: the camera's roll after the shortest rotation that makes it look at the
+    point. So for a camera that looks at the point, the angles equal its viewpoint's.
     Straight above or below, where azimuth and tilt are the same rotation, tilt is 0.
     """
     rows: list[list[float]] = camera_from_object[:3].tolist()
@@ -164,12 +164,12 @@ def view_of(camera_from_object: Float, center: Float) -> ObjectView:
 
 
 def _degrees(angle: float) -> float:
-    """Radians in degrees, rounded to 1e-9, so that a full turn less a rounding error becomes 0 and not 360."""
+    """Radians converted to degrees, rounded to 1e-9, so that a full turn minus a rounding error becomes 0 and not 360."""
     return round(math.degrees(angle), 9) + 0.0
 
 
 def _shortest_turn(x: float, y: float, z: float) -> tuple[float, float, float]:
-    """The first row of the rotation that takes the unit vector (x, y, z) to +z by the shortest way."""
+    """The first row of the shortest rotation from the unit vector (x, y, z) to +z."""
     if z < -1 + 1e-12:
         return 1.0, 0.0, 0.0
     k = 1 / (1 + z)

@@ -1,4 +1,4 @@
-"""The check that labels of places share: it finds points that their pixels do not show, or not at their depth."""
+"""A check shared by labels of positions: it finds points that are not at their pixels or not at their depth."""
 
 from __future__ import annotations
 
@@ -12,21 +12,21 @@ from viewsphere.model.sample import Sample
 Float = NDArray[np.float64]
 
 ROUNDING = 4e-7
-"""Share of the numbers that a point was computed from by which float32 may move it."""
+"""Rounding error of float32, as a share of the numbers from which a point was computed."""
 
 
 def exact_depth(sample: Sample) -> Array | None:
-    """The depth of a sample, None where it is not kept, or is kept in whole steps: only PNG files do that."""
+    """The depth of a sample; None if it is not stored, or is stored in whole steps, as only PNG files do."""
     return None if sample.files.get("depth", "").endswith(".png") else channel_of(sample, "depth")
 
 
 def misplaced(sample: Sample, points: Float, pixels: NDArray[np.bool_], slack: Float) -> NDArray[np.bool_]:
-    """Return a mask of the points (N, 3), metres in a camera's axes, that are off the rays of these pixels (H, W). N pixels are
-    True. Points off their depth count too, where depth is exact; `slack` (N,) is the rounding error in metres.
+    """Return a mask of the points (N, 3), metres in a camera's axes, that are off the rays of the N True pixels in `pixels`
+    (H, W). If depth is exact, points off their depth count too; `slack` (N,) is the rounding error in metres.
     """
     rays = pixel_rays(sample.camera.intrinsics)
     rays = rays.reshape(-1, 3) if pixels.all() else rays[pixels]
-    x, y, z = points.T  # by columns: numpy takes long over rows of three
+    x, y, z = points.T  # by columns, because numpy is slow on rows of three
     a, b, c = rays.T
     along = (x * a + y * b + z * c) / (a * a + b * b + c * c)
     x, y, off = x - along * a, y - along * b, z - along * c

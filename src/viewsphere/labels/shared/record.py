@@ -1,4 +1,4 @@
-"""Objects as plain JSON and back, exactly: whole, or short, without everything that follows from their shot and models."""
+"""Exact conversion of objects to plain JSON and back. Short records leave out everything that follows from shot and models."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def annotation_of(object_id: int, values: Iterable[Mapping[str, Any]], source: M
 
 
 def computed(object_id: int, values: Iterable[Mapping[str, Any]], placement: Placement, makers: Makers) -> ObjectAnnotation:
-    """The rendered object with these fields. All others follow from them and from the placement: those that a recipe's
+    """The rendered object with these fields. All other fields follow from them and from the placement. Fields that a recipe's
     `annotations` name are computed here, the rest when first read.
     """
     made = from_short_record({"id": object_id}, placement, makers)
@@ -48,7 +48,7 @@ def whole_record(o: ObjectAnnotation, labels: Sequence[ObjectLabel]) -> dict[str
 
 
 def from_whole_record(record: Mapping[str, Any], labels: Sequence[ObjectLabel]) -> ObjectAnnotation:
-    """The object that a whole record was made of."""
+    """The object from which a whole record was made."""
     values = {f.name: f.value(record[f.name]) for f in _fields(labels) if f.name in record}
     if type(record["id"]) is not int or record["id"] < 1:
         raise ValueError(f"object {record['id']!r:.40}: expected a number from 1 on")
@@ -57,7 +57,7 @@ def from_whole_record(record: Mapping[str, Any], labels: Sequence[ObjectLabel]) 
 
 
 def finite(source: Any) -> None:
-    """Raise ValueError for a foreign entry with numbers that no JSON has: NaN, infinite."""
+    """Raise ValueError for a foreign entry with NaN or infinite numbers, which JSON does not allow."""
     if source is not None:
         json.dumps(source, allow_nan=False)
 
@@ -67,16 +67,14 @@ def _fields(labels: Sequence[ObjectLabel]) -> Iterable[Field]:
 
 
 def short_record(o: ObjectAnnotation, labels: Iterable[ObjectLabel]) -> dict[str, Any]:
-    """The parts of a rendered object that labels keep, by the labels' names."""
+    """The stored parts of a rendered object, by the labels' names."""
     kept = {label.name: label.keep(o) for label in labels}
     return {"id": o.id, **{name: value for name, value in kept.items() if value is not None}}
 
 
 @dataclass(frozen=True)
 class Makers:
-    """The labels that short records are restored by: by the names of fields, and `labels`, `wanted` ones among
-    them.
-    """
+    """The labels that restore short records, by the names of fields; `labels` includes the `wanted` labels."""
 
     of: Mapping[str, ObjectLabel]
     labels: Sequence[ObjectLabel]
@@ -85,24 +83,24 @@ class Makers:
 
     @cached_property
     def requested(self) -> tuple[str, ...]:
-        """The fields of requested labels that follow from others."""
+        """The fields of requested labels that follow from other fields."""
         derived_ones = (label for label in self.labels if label.on_request and label.compute is derived)
         return tuple(field.name for label in derived_ones for field in label.fields)
 
     def has(self, field: str) -> bool:
-        """Return whether objects have a field, always or by request."""
+        """Return whether objects have a field, either always or on request."""
         label = self.of[field]
         return not label.on_request or label.name in self.wanted
 
     def label(self, field: str) -> ObjectLabel | None:
-        """The label that restores a field; None for an unknown field, or one that was not requested and does not follow."""
+        """The label that restores a field; None for an unknown field, or a field that was not requested and does not follow."""
         label = self.of.get(field)
         return label if label and (label.follows or self.has(field)) else None
 
 
 def from_short_record(record: Mapping[str, Any], placement: Placement, makers: Makers) -> ObjectAnnotation:
-    """The object that a short record was made of; a field is restored when it is first asked for. `makers.where` names the
-    record in messages.
+    """The object from which a short record was made; a field is restored at the first access. `makers.where` names the record
+    in messages.
     """
     made = object.__new__(_Restored)
     made.__dict__.update(id=record["id"], source=None, _record=record, _placement=placement, _makers=makers)
@@ -119,7 +117,7 @@ class _Restored(ObjectAnnotation):
             return self._other(name)
         try:
             restored = label.restore(own["_record"].get(label.name), own["_placement"], self)
-            if label.keep is not no_record:  # all others follow from what is whole
+            if label.keep is not no_record:  # all others follow from whole records
                 for field in label.fields:
                     field.check(restored[field.name])
             own.update(restored)
@@ -140,10 +138,10 @@ class _Restored(ObjectAnnotation):
         return self.__dict__["extra"]
 
     def __dir__(self) -> list[str]:
-        """Return all attributes, also those that are not restored yet."""
+        """Return all attributes, including those not restored yet."""
         makers: Makers = self.__dict__["_makers"]
         return sorted({*object.__dir__(self), *_OWN, *filter(makers.has, makers.of)})
 
     def __getstate__(self) -> dict[str, Any]:
-        """Return every field, so that an object travels to other processes without its shot."""
+        """Return every field, so that an object can be sent to other processes without its shot."""
         return {name: getattr(self, name) for name in _OWN}

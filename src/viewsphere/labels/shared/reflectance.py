@@ -1,4 +1,4 @@
-"""The share of light that surfaces send back: the luminance of their own colours at points."""
+"""The share of light that surfaces reflect: the luminance of their base colours at points."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ from viewsphere.truth.shot_views import Painted
 Float = NDArray[np.float64]
 
 LUMINANCE = (0.2126, 0.7152, 0.0722)
-"""Of linear red, green and blue (Rec. 709)."""
+"""Luminance of linear red, green and blue (Rec. 709)."""
 
 
 def albedo(geometry: Geometry, painted: Painted, hits: Hits) -> Float:
-    """The luminance (N,) of the base colour where rays meet surfaces, 0 to 1: of the material's colour, the nearest texel of
-    its picture, and the colours of vertices, all linear.
+    """The luminance (N,) of the base colour where rays meet surfaces, 0 to 1. The base colour is the product of the material's
+    colour, the nearest texel of its picture, and the vertex colours, all linear.
     """
     out, starts = np.ones(len(hits.triangle)), geometry.triangle_start
     for i, (thing, mesh) in enumerate(zip(painted.things, painted.meshes, strict=True)):
@@ -63,7 +63,7 @@ def _of_ground(ground: Ground, place: Float) -> Float:
 
 
 def _luminance(material: Material, images: Sequence[Image], uv: Float | None, tint: Float | None) -> Float:
-    """Of a material at texture coordinates (N, 2), times colours (N, 3); one number where it has neither."""
+    """The luminance of a material at texture coordinates (N, 2), times colours (N, 3); one number if it has neither."""
     color = np.array([material.base_color[:3]])
     if tint is not None:
         color = color * tint
@@ -85,7 +85,7 @@ def _texels(pixels: NDArray[np.uint8], texture: Texture, uv: Float) -> Float:
 
 
 def _wrapped(place: Float, size: int, wrap: Wrap) -> NDArray[np.intp]:
-    """The number of the texel at a coordinate, of which 1 is the whole picture."""
+    """The index of the texel at a coordinate; 1 is the full extent of the picture."""
     if wrap == "repeat":
         return (np.floor((place - np.floor(place)) * size)).astype(np.intp).clip(0, size - 1)
     if wrap == "mirror":

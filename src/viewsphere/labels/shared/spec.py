@@ -43,18 +43,18 @@ Proof = Callable[[Sample, Models], Iterator[str]]
 
 
 def no_proof(sample: Sample, models: Models) -> Iterator[str]:
-    """The proof of a label that nothing else in a sample can contradict: only computing it again proves it."""
+    """The proof of a label that nothing else in a sample can contradict; only recomputation proves it."""
     yield from ()
 
 
 TAIL = 8
-"""Instants before a sample's own that drawings with trails are given."""
+"""Number of instants before a sample's own that drawings with trails receive."""
 
 Color = tuple[int, int, int]
 """sRGB, 0 to 255."""
 
 Extent = tuple[float, float]
-"""The least and the greatest value that a picture of numbers tells apart."""
+"""The least and the greatest value that a picture of numbers distinguishes."""
 
 
 @dataclass(frozen=True)
@@ -62,10 +62,10 @@ class Drawing:
     """The way that `preview` shows a label, and its name there. A drawing changes pixels of the picture, draws lines over it at
     a scale, or puts another picture (of the sample's size) beside it.
 
-    `trails` are lines that show the past, too. They receive the sensor's samples so far, the sample itself last; none is more
-    than `labels.TAIL` instants before it. Instead of `beside`, `within` gives a picture that distinguishes the values of an
-    extent. `extent` is a sample's own extent, so that all pictures of a sequence may have the same colours. `stand_in` replaces
-    the picture of a sample that has none, at this size. `key` gives the meaning of colours; None is words alone.
+    `trails` are lines that also show the past. They receive the sensor's samples of up to `labels.TAIL` instants before, and
+    the sample itself last. Instead of `beside`, `within` gives a picture that distinguishes the values of an extent. `extent`
+    returns a sample's own extent, so that all pictures of a sequence may have the same colours. `stand_in` makes a picture of
+    this size for a sample that has none. `key` gives the meaning of colours; an entry with None is only words.
     """
 
     name: str
@@ -79,7 +79,7 @@ class Drawing:
     key: tuple[tuple[str, Color | None], ...] = ()
 
     def picture(self, sample: Sample, extent: Extent | None = None) -> Picture | None:
-        """The picture beside a sample's, (H, W, 3) uint8 sRGB, None where nothing is shown there; `extent`: else its own."""
+        """The picture beside a sample's, (H, W, 3) uint8 sRGB, or None; `extent` replaces the sample's own extent."""
         if self.within and self.extent:
             return self.within(sample, extent or self.extent(sample))
         return self.beside(sample) if self.beside else None
@@ -112,16 +112,16 @@ class LabelSpec(Spec):
 
     @property
     def view_offsets(self) -> frozenset[int]:
-        """Instants whose triangles the label reads, counted from the picture's own."""
+        """Instants whose triangles the label reads, relative to the picture's own."""
         return frozenset(need.view_offset for need in self.needs) - {0}
 
     @property
     def pose_offsets(self) -> frozenset[int]:
-        """Instants whose poses the label reads, with or without triangles, counted from the picture's own."""
+        """Instants whose poses the label reads, with or without triangles, relative to the picture's own."""
         return frozenset(need.pose_offset for need in self.needs) - {0}
 
     def is_in(self, sample: Sample) -> bool:
-        """Return whether a sample has it."""
+        """Return whether a sample has the label."""
         return self.name in sample.requested
 
 
@@ -155,7 +155,7 @@ class ChannelLabel(LabelSpec):
         return self
 
     def is_in(self, sample: Sample) -> bool:
-        """Return whether the sample keeps the channel."""
+        """Return whether the sample has the channel."""
         return self.name in sample.channels
 
     @property
@@ -203,11 +203,11 @@ class ObjectLabel(LabelSpec):
 
     @property
     def follows(self) -> bool:
-        """Return whether it follows from the content of every data set, requested or not."""
+        """Return whether the label follows from the content of every data set, requested or not."""
         return self.keep is no_record and self.options is None and not self.needs
 
     def is_in(self, sample: Sample) -> bool:
-        """Return whether the sample's objects have it: it was asked for, or did not have to be."""
+        """Return whether the sample's objects have the label: it was requested, or needs no request."""
         return not self.on_request or self.name in sample.requested or (self.follows and sample.origin is not None)
 
     @staticmethod
@@ -222,7 +222,7 @@ class ObjectLabel(LabelSpec):
         drawing: Drawing | None = None,
         on_request: bool = False,
     ) -> ObjectLabel:
-        """A label computed from the poses of object and camera and from the model alone: nothing of it is stored."""
+        """A label computed only from the poses of object and camera and from the model; nothing is stored for it."""
         return ObjectLabel(
             name=name,
             meaning=meaning,
@@ -262,5 +262,5 @@ def channel_of(sample: Sample, name: str) -> Array | None:
 def mixed(triangles: Array, numbers: Array) -> int:
     """Return how many of the given triangles have several numbers; each pixel has a triangle and a number."""
     one = np.zeros(int(triangles.max()) + 1, numbers.dtype)
-    one[triangles] = numbers  # of each triangle one of its numbers
+    one[triangles] = numbers  # one of the numbers for each triangle
     return len(np.unique(triangles[one[triangles] != numbers]))

@@ -9,7 +9,7 @@ T = TypeVar("T")
 
 
 class Table(Mapping[str, T]):
-    """Labels, or facts about them, by name. Reading a name imports its label alone; going through the table imports all."""
+    """Labels, or facts about them, by name. Reading a name imports only its label; iterating over the table imports all."""
 
     def __init__(self, names: Callable[[], Iterable[str]], of: Callable[[str], T | None]) -> None:
         self._names, self._of = names, of

@@ -12,8 +12,8 @@ from viewsphere.materials.shared.surface import Map
 
 
 class Strokes(NamedTuple):
-    """Height, 0 where none lies to 1; the number of the stroke on top, -1 for none; the share of the way along it, negative on
-    its shaded side.
+    """Height from 0 (no stroke) to 1; the number of the stroke on top, -1 for none; the position along it as a share of its
+    length, negative on its shaded side.
     """
 
     height: Map
@@ -21,7 +21,7 @@ class Strokes(NamedTuple):
     along: Map
 
     def each(self, values: NDArray[np.float64]) -> Map:
-        """Numbers (count,), one a stroke, where it is seen; of the last where none is."""
+        """Map of numbers (count,), one per stroke, at the stroke on top; the last number where there is no stroke."""
         return values.astype(np.float32)[self.number.astype(np.intp)]
 
 
@@ -33,9 +33,9 @@ def strokes(
     bend: float,
     rng: np.random.Generator,
 ) -> Strokes:
-    """So many bent strokes, each in a direction of its own; lengths and widths from and to, shares of the square.
+    """A number of bent strokes, each in its own direction; ranges of lengths and widths are shares of the square.
 
-    bend: how much of its length a stroke's tip is aside.
+    `bend` is the sideways shift of a stroke's tip, as a share of its length.
     """
     u = rng.random((6, count))
     heading = _directions(u[2])

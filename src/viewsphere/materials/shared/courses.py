@@ -27,7 +27,7 @@ class Courses:
     count: int
 
     def each(self, values: NDArray[np.float64]) -> Map:
-        """Numbers (count,), one a piece, where its texels are."""
+        """Map of numbers (count,), one per piece, at the piece's texels."""
         return values.astype(np.float32)[self.piece]
 
 
@@ -73,6 +73,8 @@ def bonded(rows: int, columns: int, shift: float = 0.5) -> NDArray[np.float64]:
 
 
 def uneven(rng: np.random.Generator, rows: int, columns: int, spread: float) -> NDArray[np.float64]:
-    """Cuts (rows, columns) at random; spread: by which share of a piece each is off, up to 0.5 either way."""
+    """Random cuts (rows, columns); `spread` is the maximum shift of a cut in either direction, as a share of a piece, up to
+    0.5.
+    """
     off = spread * (rng.random((rows, columns)) - 0.5)
     return np.sort(((np.arange(columns) + off) / columns + rng.random((rows, 1))) % 1.0, axis=1)

@@ -1,6 +1,6 @@
 """Noise, cells and strokes that repeat from one edge of a square to the other, from a hash of lattice points.
 
-No operation but those that IEEE 754 rounds alike on every processor: no powers, no sines, nothing reordered.
+It uses only operations that IEEE 754 rounds identically on every processor: no powers, no sines, no reordering.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ def _chance(bits):
 
 @inner
 def _slope(bits, x, y):
-    """The product of a place with one of eight directions."""
+    """The dot product of a place with one of eight directions."""
     a, b = (x, y) if bits & uint32(4) else (y, x)
     return (-a if bits & uint32(1) else a) + (-b if bits & uint32(2) else b) * float32(0.5)
 

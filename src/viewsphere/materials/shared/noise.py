@@ -1,4 +1,4 @@
-"""Noise and cells that tile, and what is made of them."""
+"""Tileable noise and cells, and functions of them."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ Cells = int | tuple[int, int]
 def noise(size: int, cells: Cells, seed: int, octaves: int = 1, gain: float = 0.5) -> Map:
     """Sum of gradient noise, each octave twice as fine and `gain` times as strong as the one before; about -1 to 1.
 
-    Octaves that are too fine for the texels are left out, so that a larger map shows the same with more detail.
+    Octaves that are too fine for the texels are left out, so that a larger map shows the same pattern in more detail.
     """
     out, amplitude, total = np.zeros((size, size), np.float32), 1.0, 0.0
     across, down = (cells, cells) if isinstance(cells, int) else cells
@@ -56,7 +56,7 @@ def smooth(low: float, high: float, values: Map) -> Map:
 
 
 def wave(turns: Map) -> Map:
-    """The sine of so many turns, to a thousandth: of parabolas, which every processor rounds alike."""
+    """The sine of a number of turns, to a thousandth, made of parabolas, which every processor rounds identically."""
     t = turns - np.floor(turns + np.float32(0.5))
     first = 8 * t - 16 * t * np.abs(t)
     return first * (np.float32(0.775) + np.float32(0.225) * np.abs(first))

@@ -15,10 +15,10 @@ Light = NDArray[np.floating[Any]]
 """Linear colour, (N, N, 3) float32, row 0 on top."""
 
 Color = tuple[float, float, float]
-"""Linear red, green and blue: the share of the light that comes back."""
+"""Linear red, green and blue: the share of the light that a surface reflects."""
 
 DARKEST, BRIGHTEST = 0.02, 0.8
-"""No surface gives back less or more light, but for metals and water: charcoal and fresh snow."""
+"""Limits of the reflected share of light, except for metals and water: charcoal and fresh snow."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,4 +1,4 @@
-"""The grain of boards that are sawn from trunks: rings about a pith that lies off the board, fibres, pores."""
+"""The grain of boards sawn from trunks: rings about a pith outside the board, fibres, pores."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from viewsphere.materials.shared.tones import times
 
 @dataclass(frozen=True)
 class Timber:
-    """A kind of wood: colours of early and late wood, a ring's width in metres, how strong rings and pores are, 0 to 1."""
+    """A kind of wood: colours of early and late wood, a ring's width in metres, strength of rings and pores, 0 to 1."""
 
     early: Color = (0.42, 0.25, 0.13)
     late: Color = (0.24, 0.12, 0.05)

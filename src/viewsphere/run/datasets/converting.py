@@ -1,4 +1,4 @@
-"""Data sets of other tools in other formats, with no data set of ours left behind."""
+"""The conversion of data sets from other tools to other formats, without leaving a viewsphere data set behind."""
 
 from __future__ import annotations
 
@@ -47,14 +47,14 @@ def convert(
     workers: int = 0,
     listener: Listener | None = None,
 ) -> Converted:
-    """Write a data set of another tool, of the format `kind`, in these formats, each to OUT/<format>, as `export` does. The
-    files there are hard links to the source's or copies of them: it may go.
+    """Write another tool's data set, of the format `kind`, in these formats, each to OUT/<format>, as `export` does. The files
+    are hard links to the source's files or copies of them, so you can delete the source afterwards.
 
-    Nothing is written unless all of it is. A folder that an earlier run put in place, with the same files, stays: a run
-    that was killed between two folders can be repeated.
+    Either all folders are written or none. A folder from an earlier run with the same files stays, so a run that was killed
+    between two folders can be repeated.
 
-    Raises UserError for formats that are not known or do not hold what was read, StoreError for a data set that is broken,
-    unless `keep_going` leaves that out, and for folders that hold other files.
+    Raises UserError for formats that are unknown or cannot hold the data set. Raises StoreError for a broken data set, unless
+    `keep_going` leaves the broken parts out, and for folders that contain other files.
     """
     entries = read_formats(formats)
     for entry in entries:
@@ -66,7 +66,7 @@ def convert(
     foreign = read_dataset(kind, source, keep_going=keep_going, field="--from")
     refuse(entries, scope_of_foreign(foreign), source)
     with ExitStack() as whole:
-        # In order of their names: of two runs at the same time, the first to put one folder in place puts all shared ones.
+        # In order of names: of two simultaneous runs, the first to put one folder in place puts all shared folders in place.
         ordered = sorted(entries, key=lambda entry: entry.name)
         folders = [(entry, whole.enter_context(_folder(located(out) / entry.name))) for entry in ordered]
         store = whole.enter_context(scratch_folder(folders[0][1].parent)) / "store"  # on the same disk, for links
@@ -79,10 +79,10 @@ def convert(
 
 @contextmanager
 def _folder(target: Path) -> Generator[Path]:
-    """A folder to write into that becomes `target`, or goes where `target` has the same files already, also where another run
-    puts them there meanwhile.
+    """A folder to write into that becomes `target`. It is deleted if `target` already has the same files, also if another run
+    has put them there meanwhile.
 
-    Raises StoreError where other files lie there.
+    Raises StoreError if `target` contains other files.
     """
     made = b""
     if (target / CHECKSUMS).is_file():
@@ -103,7 +103,7 @@ def _folder(target: Path) -> Generator[Path]:
 
 
 def _check_same(made: bytes, target: Path) -> None:
-    """Raise StoreError unless the files of a folder are those of this list of digests."""
+    """Raise StoreError unless the files of a folder match this list of digests."""
     listed = target / CHECKSUMS
     is_same = listed.is_file() and read_bytes(listed, "MAX_STREAMED_BYTES") == made
     if not is_same or any(damaged_files(target)):
@@ -111,12 +111,12 @@ def _check_same(made: bytes, target: Path) -> None:
 
 
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
-"""Errors of a disk that takes no more data."""
+"""Error codes of a full disk."""
 
 
 @contextmanager
 def _told_of(store: Path, foreign: ForeignDataset, source: Path | str, out: Path) -> Generator[None]:
-    """Report errors as the source's, or as the output's where its disk is full, and not as those of a store that goes."""
+    """Report errors as errors of the source, or of the output if its disk is full, but not of the temporary store."""
     try:
         yield
     except UserError as error:
@@ -133,6 +133,6 @@ def _told_of(store: Path, foreign: ForeignDataset, source: Path | str, out: Path
 
 
 def _check_outside(source: Path | str, folder: Path) -> None:
-    """Raise UserError for a folder that lies in the data set that is read."""
+    """Raise UserError for a folder inside the source data set."""
     if folder.resolve().is_relative_to(Path(source).resolve()):
         raise UserError(f"-o: expected a folder outside of the data set that is read; found {folder}")

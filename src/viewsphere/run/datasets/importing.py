@@ -1,4 +1,4 @@
-"""Data sets made elsewhere become data sets of ours."""
+"""The import of data sets made elsewhere."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from viewsphere.store.shots.records import IMPORT, NAME_BYTES
 from viewsphere.validation.errors import one_of
 
 SHOT_FRAMES = 1000
-"""Frames that are kept in one folder and written at once."""
+"""Number of frames that are stored in one folder and written together."""
 
 
 def readable_formats() -> tuple[str, ...]:
@@ -35,10 +35,10 @@ def _readers() -> dict[str, Callable[..., ForeignDataset]]:
 def import_dataset(
     kind: str, source: Path | str, out: Path | str, *, keep_going: bool = False, listener: Listener | None = None
 ) -> ForeignDataset:
-    """Open a data set of another tool as one of ours, in `out`; its pictures are linked, not copied, where that is possible.
+    """Import a data set of another tool into `out`; pictures are linked instead of copied if possible.
 
-    Gives what was read; `left_out` tells what `keep_going` left out. Raises UserError for a format that cannot be read,
-    StoreError for a data set that is broken (before anything is written) and for an `out` that holds other data.
+    Returns the foreign data set; its `left_out` lists the parts that `keep_going` left out. Raises UserError for a format that
+    cannot be read, StoreError for a broken data set (before anything is written) and for an `out` that contains other data.
     """
     foreign = read_dataset(kind, source, keep_going=keep_going)
     put_in_store(foreign, located(out), listener)
@@ -56,7 +56,7 @@ def read_dataset(kind: str, source: Path | str, *, keep_going: bool = False, fie
 
 
 def put_in_store(foreign: ForeignDataset, out: Path, listener: Listener | None = None) -> None:
-    """Write what was read into a store, or find that done; raises StoreError for an `out` that holds other data."""
+    """Write the data set into a store, unless it is there already; raises StoreError for an `out` that contains other data."""
     store, record = Store(out), _plan_record(foreign)
     with store.opened_for(record):
         for model in foreign.models:

@@ -1,4 +1,4 @@
-"""Several data sets become one: categories by name, models by content, everything renumbered."""
+"""The merge of several data sets into one: categories by name, models by content, everything renumbered."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ from viewsphere.validation.quantity import quantity
 
 @dataclass(frozen=True, eq=False)
 class _Source:
-    """A data set, and what its numbers and names become in the merged one."""
+    """A data set, with its new numbers and names in the merged data set."""
 
     dataset: Dataset
     number: int
@@ -48,7 +48,7 @@ class _Source:
     first_pose: int
     categories: Mapping[int, Category]
     model_keys: Mapping[str, str]
-    sequences: Mapping[str, str]  # of those that an earlier source has, too, the new names
+    sequences: Mapping[str, str]  # new names of those that an earlier source also has
 
     def named(self, old: str) -> str:
         """The new name of a model or of a sequence."""
@@ -56,19 +56,19 @@ class _Source:
 
     @property
     def keeps_categories(self) -> bool:
-        """Return whether every category id stays what it is."""
+        """Return whether no category id changes."""
         return all(old == new.id for old, new in self.categories.items())
 
     @cached_property
     def tables(self) -> Mapping[IdKind, Mapping[int, int]]:
-        """New ids by old ones, of each kind that merging renumbers: ids of objects and of parts are those of a shot and of a
-        model, which stay whole.
+        """New ids by old ids, for each kind that merging renumbers. Ids of objects and parts do not change, because shots and
+        models stay whole.
         """
         return {"category": {old: new.id for old, new in self.categories.items()}}
 
     @property
     def rows(self) -> tuple[Row, ...]:
-        """Its finished shots, as it numbers them."""
+        """Its finished shots, in its own numbering."""
         return self.dataset.rows
 
 
@@ -80,12 +80,12 @@ def merge(
     keep_going: bool = False,
     listener: Listener | None = None,
 ) -> Dataset:
-    """Join data sets into a new one in `out`, in their order; their pictures are linked, not copied, where that is possible.
+    """Join data sets into a new one in `out`, in their order; pictures are linked instead of copied if possible.
 
-    Categories of one name become one, and keep the first's id. Models of one key stay one where their content is the same;
-    else the later one gets another key. Splits are united by name. The sources are only read. Raises UserError for data sets
-    of different cameras or channels, unless they are to be `mixed`; StoreError for unfinished ones, unless `keep_going` takes
-    what is there, and for an `out` that holds other data.
+    Categories of the same name become one, with the first one's id. Models of the same key stay one if their content is equal;
+    otherwise the later model gets another key. Splits are united by name. The sources do not change. Raises UserError for data
+    sets with different cameras or channels, unless `mixed` allows them. Raises StoreError for unfinished data sets, unless
+    `keep_going` accepts them, and for an `out` that contains other data.
     """
     datasets = [Dataset(source) for source in sources]
     _check_sources(datasets, located(out))
@@ -155,7 +155,7 @@ def _check_alike(datasets: Sequence[Dataset]) -> None:
 
 
 def _lenses(dataset: Dataset) -> set[Intrinsics | None]:
-    """The lenses of a data set's parts, None for pictures of unknown ones; frames of a part have one."""
+    """The lenses of a data set's parts, None for pictures with an unknown lens; all frames of a part share one lens."""
     firsts = {part.first for part in dataset.plan.parts if part.frames and part.first < len(dataset)} or {0}
     cameras = (dataset[first].known_camera for first in firsts)
     return set(None if camera is None else camera.intrinsics for camera in cameras)
@@ -205,14 +205,14 @@ def _tells_names(dataset: Dataset) -> bool:
 
 
 def _free(name: str, taken: set[str]) -> str:
-    """A sequence's new name, which no earlier source has."""
+    """A new name for a sequence, not used by an earlier source."""
     return next(new for number in count(2) if (new := f"{name}{MERGED}{number}") not in taken)
 
 
 def _joined(categories: dict[int, Category], category: Category, others: set[int]) -> Category:
-    """The category of this name, put there with its own id, or a free one, if there is none.
+    """The category of this name. If there is none, it is added with its own id or a free id.
 
-    `others` are ids of this data set's other categories: what it tells apart stays apart.
+    `others` are the ids of this data set's other categories, which must stay distinct.
     """
     name = category.name.casefold()
     same = [c for c in categories.values() if c.name.casefold() == name and c.id not in others]
@@ -224,7 +224,7 @@ def _joined(categories: dict[int, Category], category: Category, others: set[int
 
 
 def _key_for(contents: dict[str, tuple[object, ...]], info: ModelInfo, category: Category) -> str:
-    """The model's key, or one with a number where another model has it; `contents` gets it."""
+    """The model's key, with a number appended if another model has that key; the key is added to `contents`."""
     steps = tuple((one.key, one.digest, one.real_size) for one in info.steps)
     said = info.symmetries, info.keypoints, info.looks, info.faces
     number, key, content = 1, info.key, (info.digest, info.real_size, category.id, steps, *said)
@@ -261,9 +261,10 @@ def _plan_record(sources: Sequence[_Source], categories: tuple[Category, ...], m
 
 
 def _parts(source: _Source) -> Iterator[Part]:
-    """Yield the finished portions of the source's parts, renumbered; channels supplied by a later part join the others.
+    """Yield the finished portions of the source's parts, renumbered; channels added by a later part join the others.
 
-    An unfinished part has no digest for its lookup, since no recipe renders its rest. All poses come with the first.
+    An unfinished part has no digest to look it up by, since no recipe renders its remainder. All poses come with the first
+    part.
     """
     plan, first, names = source.dataset.plan, source.first_frame, kept(names_of(source.dataset.plan))
     for number, part in enumerate(plan.parts):
@@ -293,7 +294,7 @@ def _parts(source: _Source) -> Iterator[Part]:
 
 
 def _moved(source: _Source, part: Part, block: Block) -> Block:
-    """The block with its models' new keys and its poses' new numbers; where poses are not known, positions are frames."""
+    """The block with its models' new keys and its poses' new numbers; if poses are unknown, positions are frames."""
     by = source.first_pose if part.is_sampled else source.first_frame
     worlds = {name: part.world(name) for name in block.subjects}
     subjects = tuple(source.model_keys.get(world, world) + name.removeprefix(world) for name, world in worlds.items())
@@ -301,7 +302,7 @@ def _moved(source: _Source, part: Part, block: Block) -> Block:
 
 
 def _credits(sources: Sequence[_Source]) -> dict[str, Credit]:
-    """The credit of each model, by its new key: of one that several sources have, the first that is known."""
+    """The credit of each model, by its new key; for a model in several sources, the first known credit."""
     found: dict[str, Credit] = {}
     for source in sources:
         for info in source.dataset.models:
@@ -319,7 +320,7 @@ def _link_models(source: _Source, store: Store, credits: Mapping[str, Credit]) -
 
 
 def _link_frames(source: _Source, targets: Iterator[Row], store: Store, record: PlanRecord, listener: Listener | None) -> None:
-    """Link the source's shots as the next of `targets`."""
+    """Link the source's shots to the next rows of `targets`."""
     for row, target in zip(source.rows, islice(targets, len(source.rows)), strict=True):
         if not store.has_shot(target.key):
             places = zip(source.dataset.samples_of(row.key, range(row.count)), count(target.first), strict=False)
@@ -356,7 +357,7 @@ def _moved_object(source: _Source, o: ObjectAnnotation) -> ObjectAnnotation:
 
 
 def _with_ids(source: _Source, values: Mapping[str, Any], labels: Iterable[ObjectLabel | SampleLabel]) -> dict[str, Any]:
-    """Values of labels' fields, with the ids of the merged data set."""
+    """The values of labels' fields, with the ids of the merged data set."""
     ids = {field.name: field.ids for label in labels for field in label.fields}
     return {name: renumbered(value, ids.get(name), source.tables) for name, value in values.items()}
 
@@ -367,7 +368,7 @@ def _of(category: Category) -> dict[str, Any]:
 
 
 def _with_category_ids(source: _Source, sample: Sample) -> Iterator[tuple[str, Loaded]]:
-    """The channels that hold ids of categories, with those of the merged data set, encoded."""
+    """The channels that contain category ids, converted to the ids of the merged data set and encoded."""
     kinds = source.dataset.kinds[source.dataset.plan.part_of(sample.index)]
     for name, label in channel_labels().items():
         if name in sample.files and label.ids and source.tables.keys() & label.ids.keys():

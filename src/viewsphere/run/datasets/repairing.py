@@ -1,4 +1,4 @@
-"""Damaged shots and models of a data set, made again by the recipes that made them; nothing else is touched."""
+"""The repair of damaged shots and models by the recipes that made them; nothing else is touched."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ Errors = dict[str, ViewsphereError]
 
 @dataclass(frozen=True, eq=False)
 class Mender:
-    """Makes what is damaged again, by so many worker processes (0: in this one)."""
+    """Remakes damaged models and shots with a number of worker processes (0: in this process)."""
 
     store: Store
     record: PlanRecord
@@ -32,7 +32,7 @@ class Mender:
     tell: Listener
 
     def models(self, keys: Iterable[str]) -> Errors:
-        """Make the models of these keys again; gives what could not be done."""
+        """Remake the models of these keys; returns the errors of those that failed."""
         errors, wanted = _sorted(keys, self._part_of_model)
         for number, found in wanted.items():
             specs = self._replanned.models(number)
@@ -44,7 +44,7 @@ class Mender:
         return errors
 
     def shots(self, keys: Iterable[str]) -> Errors:
-        """Render the shots of these keys again, if their models are what they were; gives what could not be done."""
+        """Render the shots of these keys again, if their models are unchanged; returns the errors of those that failed."""
         errors, wanted = _sorted(keys, self._part_of_shot)
         for number, found in wanted.items():
             rows = [row for row in map(self.record.find, found) if row is not None]
@@ -73,7 +73,7 @@ class Mender:
                 self.tell(Progress("repair", done, len(jobs)))
 
     def _part_of_shot(self, key: str) -> int:
-        """Number of the part that renders it; raises StoreError where none does."""
+        """Number of the part that renders the shot; raises StoreError if none does."""
         row = self.record.find(key)
         if row is None:
             raise StoreError(f"{key}: expected a shot of the plan, found another")
@@ -81,7 +81,7 @@ class Mender:
         return row.part
 
     def _part_of_model(self, key: str) -> int:
-        """Number of the last part that has it; raises UserError where none can be made again."""
+        """Number of the last part that has the model; raises UserError if no part can remake it."""
         problem: UserError = StoreError(f"model {key}: expected a recipe that has it, found none")
         for number in reversed(range(len(self.record.parts))):
             try:
@@ -92,7 +92,7 @@ class Mender:
         raise problem
 
     def _portion(self, number: int) -> DatasetPart:
-        """A part, with its recipe's plan; raises UserError where that is not what it was."""
+        """A part with its recipe's plan; raises UserError if the plan has changed."""
         check_whether_same(self.store, self.record.parts[number])
         try:
             return self._replanned.portion(number)
@@ -112,7 +112,7 @@ class Mender:
 
 
 def _sorted(keys: Iterable[str], part_of: Callable[[str], int]) -> tuple[Errors, dict[int, list[str]]]:
-    """The keys of each part; and of those that none can make again, why."""
+    """The keys of each part, and the errors of the keys that no part can remake."""
     errors: Errors = {}
     found: defaultdict[int, list[str]] = defaultdict(list)
     for key in keys:

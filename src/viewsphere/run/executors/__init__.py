@@ -18,7 +18,7 @@ __all__ = ["LIVES", "Job", "Listed", "Outcome", "Queue", "Work", "WorkerPool", "
 
 
 class WorkerPool(Protocol):
-    """Workers for a part of a data set, who stay warm until the context ends."""
+    """Workers for a part of a data set, which stay warm until the context ends."""
 
     def __enter__(self) -> Self: ...
 
@@ -26,7 +26,7 @@ class WorkerPool(Protocol):
 
     @property
     def under_way(self) -> int:
-        """Frames that were made of jobs without an outcome so far; those of a worker that dies no longer count."""
+        """Number of finished frames in jobs without an outcome; the frames of a worker that dies no longer count."""
         ...
 
     @property
@@ -36,24 +36,25 @@ class WorkerPool(Protocol):
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """The notes about the workers for the user, a line each."""
+        """Notes about the workers for the user, one line each."""
         ...
 
     def run(self, work: Work, report: Callable[[], None] = ignored) -> Iterator[Outcome]:
-        """Do all jobs; outcomes come as they are ready. `report` is called when there is news, such as another frame under way.
+        """Do all jobs and yield their outcomes as they are ready. `report` is called on progress, such as another finished
+        frame.
 
-        A UserError is an outcome, and so is WorkerDied, of a job that was lost with its worker LIVES times; this one is raised
-        where MOST_DEATHS workers die one after another and nothing is done in between, and anything else
-        that a worker raises ends the run with its traceback.
+        A UserError is an outcome, and so is WorkerDied for a job that was lost with its worker LIVES times. WorkerDied is
+        raised if MOST_DEATHS workers die one after another without finishing a job. Any other exception in a worker ends the
+        run with its traceback.
         """
         ...
 
 
 def worker_pool(root: Path, portion: DatasetPart, workers: int, ray: str | None = None) -> WorkerPool:
-    """A worker pool for a part of the data set at `root`: so many workers of this machine, this process itself if none; or,
-    with the address of a Ray cluster, at most so many of its CPUs, all if none.
+    """A worker pool for a part of the data set at `root`. It has `workers` processes of this machine, or is this process
+    itself if 0. With the address of a Ray cluster it has at most `workers` of the cluster's CPUs, or all if 0.
 
-    Raises UserError for an address that cannot be one, MissingExtraError where Ray is not installed.
+    Raises UserError for an invalid address, MissingExtraError if Ray is not installed.
     """
     if ray is None:
         from viewsphere.run.executors.local import LocalPool

@@ -14,17 +14,18 @@ if TYPE_CHECKING:
     from viewsphere.run.shots.tasks import Worker
 
 LIVES = 2
-"""Tries of a task whose process dies; the last one runs alone, in case memory was too small."""
+"""Attempts at a task whose process dies; the last attempt runs alone, in case memory was too small."""
 
 MOST_DEATHS = 16
-"""Deaths of workers, with no job ended in between, after which a run ends: what kills these kills the next ones, too."""
+"""Number of workers that may die without a finished job in between; then the run ends, because later ones would die as well."""
 
 
 class Work(Protocol):
-    """The jobs of a run, in lines: jobs of one line share the warm caches of a worker. Jobs are counted out one by one."""
+    """The jobs of a run, grouped in lines: jobs of one line share the warm caches of a worker. Jobs are generated one by one.
+    """
 
     def lines(self) -> Iterable[tuple[str, int]]:
-        """The name of each line, and about how many jobs are in it."""
+        """The name of each line, and the approximate number of its jobs."""
         ...
 
     def jobs(self, line: str) -> Iterator[Job]:
@@ -34,7 +35,7 @@ class Work(Protocol):
 
 @dataclass(frozen=True)
 class Job:
-    """Something to do: its key in the data set, its line, and what a worker is told."""
+    """A unit of work: its key in the data set, its line, and the task for a worker."""
 
     key: str
     line: str
@@ -43,12 +44,12 @@ class Job:
 
 @dataclass(frozen=True)
 class Listed:
-    """A few jobs, all named at once."""
+    """Work from a list of a few jobs."""
 
     all: tuple[Job, ...]
 
     def lines(self) -> Iterable[tuple[str, int]]:
-        """Their lines in the order of their first jobs."""
+        """The lines in the order of their first jobs."""
         return Counter(job.line for job in self.all).items()
 
     def jobs(self, line: str) -> Iterator[Job]:
@@ -66,14 +67,14 @@ class Outcome:
 
 
 def ignored() -> None:
-    """Nobody wants to know of frames under way."""
+    """The `report` that does nothing."""
 
 
 class Queue:
-    """Jobs in their lines: a worker is given what it has warm, then of a line that nobody has, then of the line of which most
-    is left. The next job of a line is asked for when a worker is free for it.
+    """The queue of jobs in lines. A worker gets a job of its warm line first, then of a line without a worker, then of the line
+    with the most jobs left. The next job of a line is generated when a worker is free for it.
 
-    `warm`: lines of workers who have not asked yet.
+    `warm`: lines of workers that have not requested a job yet.
     """
 
     def __init__(self, work: Work, warm: Iterable[str] = ()) -> None:
@@ -92,16 +93,16 @@ class Queue:
 
     @property
     def is_done(self) -> bool:
-        """Return whether there is surely none to be handed out."""
+        """Return whether certainly no job is left."""
         return not self._left and not self._back and not self._again
 
     @property
     def left(self) -> int:
-        """About how many jobs are to be handed out."""
+        """The approximate number of jobs left."""
         return len(self._back) + len(self._again) + sum(max(count, 1) for count in self._left.values())
 
     def next(self, warm: str) -> Job | None:
-        """The next job for a worker that has this line warm; None if there is none."""
+        """The next job for a worker whose warm line is this one; None if no job is left."""
         if self._back:
             return self._back.pop()
         while self._left:
@@ -125,12 +126,13 @@ class Queue:
         return max(self._left, key=lambda line: self._left[line] / self._takers[line])
 
     def ended(self) -> None:
-        """A job came to its end: workers can live."""
+        """Note that a job ended, which resets the count of deaths."""
         self._deaths = 0
 
     def again(self, job: Job, how: str, alone: bool = True) -> Outcome | None:
-        """Put back a job whose worker died, for the next one or, if it may be to blame, for when it is `alone`; gives what
-        there is to say of it if it was tried often enough. Raises WorkerDied where nobody lives long enough to end a job.
+        """Put back a job whose worker died. The next worker gets it; if the job may be the cause, it waits to run `alone`.
+        Returns the outcome of a job that has used up its attempts. Raises WorkerDied if workers keep dying before they end any
+        job.
         """
         self._deaths += 1
         if self._deaths == MOST_DEATHS:
@@ -143,14 +145,14 @@ class Queue:
         return None
 
     def last(self) -> Job | None:
-        """A job that was put back, for when nobody is at work beside it; None if there is none."""
+        """A job that was put back to run alone, without other workers at work; None if there is none."""
         return self._again.pop() if self._again else None
 
 
 def answer(worker: Worker, job: Job, tell: Callable[[int], None]) -> Outcome | str:
     """Return the result of a job in a worker's own process: its outcome, or the traceback of an error that ends the run.
 
-    Raises MemoryError where memory is refused; the process is unreliable afterwards.
+    Raises MemoryError if memory runs out; the process is unreliable afterwards.
     """
     try:
         return Outcome(job.key, worker.do(job.task, tell))

@@ -1,7 +1,7 @@
-"""Processes of this machine that each do one job at a time, are handed what they have warm, and may die.
+"""A pool of processes of this machine. Each does one job at a time, preferably of its warm line, and may die.
 
-`ProcessPoolExecutor` can hang when a worker dies or is replaced (CPython issue 115634) and knows nothing of what a worker has
-warm, hence our own (`workers/process.py`).
+`ProcessPoolExecutor` can hang when a worker dies or is replaced (CPython issue 115634) and ignores the warm caches of workers,
+so viewsphere has its own worker processes (`workers/process.py`).
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 ADVICE = ", the last time while it was alone: give it more memory, or ask for smaller pictures or models"
 
 LEAVING_S = 5.0
-"""Seconds that workers have to end when all is done."""
+"""Seconds for workers to end after the last job."""
 
 
 class LocalPool:
@@ -56,7 +56,7 @@ class LocalPool:
         self._here = None
 
     def _let_go(self) -> None:
-        """Give all workers the time to end by themselves, and to clear away what others could only find later."""
+        """Give all workers time to end by themselves and to remove their temporary files."""
         until = time.monotonic() + LEAVING_S
         for worker in self._pool:
             worker.pipe.close()
@@ -64,18 +64,18 @@ class LocalPool:
             worker.process.join(max(0.0, until - time.monotonic()))
 
     def _dismiss(self) -> None:
-        """End all workers, and give back the memory of what they have warm."""
+        """End all workers, and free the memory of their warm caches."""
         for worker in self._pool:
             worker.stop()
         self._pool.clear()
 
     @property
     def under_way(self) -> int:
-        """Frames that were made of jobs without an outcome so far; those of a worker that dies no longer count."""
+        """Number of finished frames in jobs without an outcome; the frames of a worker that dies no longer count."""
         return sum(self._begun.values())
 
     def run(self, work: Work, report: Callable[[], None] = ignored) -> Iterator[Outcome]:
-        """As `WorkerPool.run`; `report` is called when another frame is under way."""
+        """Like `WorkerPool.run`; `report` is called after every finished frame."""
         queue = Queue(work, [worker.line for worker in self._pool])
         if self._workers == 0:
             yield from self._run_here(queue, report)
@@ -91,13 +91,13 @@ class LocalPool:
             pass
         while busy:
             for pipe in wait(list(busy)):
-                yield from self._receive(busy, cast(Connection, pipe), queue, report)  # Windows has another class
+                yield from self._receive(busy, cast(Connection, pipe), queue, report)  # another class on Windows
             if not busy and (job := queue.last()):
                 self._dismiss()
                 self._give_to(None, job, busy)
 
     def _note(self, job: Job, frames: int, report: Callable[[], None]) -> None:
-        """Remember how many frames of a job are made."""
+        """Store the number of a job's finished frames."""
         self._begun[job.key] = frames
         report()
 
@@ -125,7 +125,7 @@ class LocalPool:
 
     def _give_to(self, worker: _Worker | None, job: Job, busy: dict[Connection, _Worker]) -> None:
         if worker is None:
-            with interrupts_deferred():  # until it is known here, so that it is ended with the others
+            with interrupts_deferred():  # until it is registered here, so that it is ended with the others
                 worker = _Worker(self._root, self._portion)
                 self._pool.append(worker)
         busy[worker.pipe] = worker
@@ -134,13 +134,13 @@ class LocalPool:
     def _receive(
         self, busy: dict[Connection, _Worker], pipe: Connection, queue: Queue, report: Callable[[], None]
     ) -> Iterator[Outcome]:
-        """Take the news of a frame; or one answer, or the news of a death, and hand out the next job."""
+        """Receive one message. After an answer or a worker's death, hand out the next job."""
         worker = busy[pipe]
         job = worker.job
         assert job is not None
         try:
             news: Outcome | str | int = pipe.recv()
-        except (EOFError, OSError):  # it may die in the middle of an answer
+        except (EOFError, OSError):  # it may die while sending an answer
             self._end(job, busy, pipe)
             self._pool.remove(worker)
             if failed := queue.again(job, end_reason(worker.end(), ADVICE)):
@@ -158,13 +158,13 @@ class LocalPool:
         yield news
 
     def _end(self, job: Job, busy: dict[Connection, _Worker], pipe: Connection) -> None:
-        """Its worker no longer does a job; the frames of one that died are made again, those of an outcome are in it."""
+        """Note that a worker no longer does its job, and stop counting the job's frames as under way."""
         self._begun.pop(job.key, None)
         del busy[pipe]
 
 
 class _Worker(WorkerProcess):
-    """One worker process, and what it has warm."""
+    """One worker process, and its warm line."""
 
     def __init__(self, root: Path, portion: DatasetPart) -> None:
         super().__init__(_serve, root, portion)
@@ -177,7 +177,8 @@ class _Worker(WorkerProcess):
 
 
 def _serve(pipe: Connection, root: Path, portion: DatasetPart) -> None:
-    """A worker's life: take a job, tell of each of its frames by their number so far, answer, until the other side is gone."""
+    """The loop of a worker: receive a job, report the number of finished frames, send the answer; ends when the parent is gone.
+    """
     belong_to_parent()
     spare_imports()
     with importing():

@@ -1,7 +1,7 @@
-"""A Ray cluster's machines: on each of their CPUs an actor that does one job at a time. Nothing else knows Ray.
+"""The executor for a Ray cluster: an actor on each CPU, which does one job at a time. No other module uses Ray.
 
-Every actor is bound to a machine, so that it is known which one a job was lost with, and which cannot be used. Ray tries
-nothing again by itself: a job that is lost is handed out anew, as in `local`.
+Every actor is bound to a machine. This identifies the machine that lost a job, and machines that cannot be used. Ray's own
+retries are off: a lost job is handed out again, as in `local`.
 """
 
 from __future__ import annotations
@@ -34,23 +34,23 @@ if TYPE_CHECKING:
     from viewsphere.run.shots.tasks import Worker
 
 TICK = 1.0
-"""Seconds between two looks at which machines there are, and how far workers are with their jobs."""
+"""Seconds between two checks of the available machines and of the workers' progress."""
 
 STARTS = 3
-"""Workers that may die in a row while starting before their machine is left out."""
+"""Number of workers in a row that may die at their start before their machine is left out."""
 
 CALLS = 3
-"""Calls to a cluster whose port is open: a busy one may be too slow to answer the first."""
+"""Number of attempts to reach a cluster whose port is open; a busy cluster may be too slow for the first."""
 
 GRACE = 10.0
-"""Seconds that a cluster has to answer when a run begins, and its workers to be gone when it ends."""
+"""Seconds for a cluster to answer when a run begins, and for its workers to be gone when the run ends."""
 
 OF_A_MACHINE = frozenset({"VIEWSPHERE_CACHE", "VIEWSPHERE_BLENDER_PYTHON"})
-"""Variables of the environment that say where something is on one machine, and mean nothing on others."""
+"""Environment variables with paths that are valid on one machine only."""
 
 
 class RayPool:
-    """Workers on the CPUs of a cluster, at most so many, all if 0; machines that join later get workers, too."""
+    """Workers on at most the given number of a cluster's CPUs, on all if 0; machines that join later also get workers."""
 
     def __init__(self, root: Path, portion: DatasetPart, most: int, address: str) -> None:
         if address != "auto" and ":" not in address:
@@ -95,11 +95,11 @@ class RayPool:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """The machines that were left out, and why."""
+        """The machines that were left out, with the reasons."""
         return tuple(f"left out {why}" for why in self._unfit.values())
 
     def run(self, work: Work, report: Callable[[], None] = ignored) -> Iterator[Outcome]:
-        """As `WorkerPool.run`; `report` is called now and then. Raises ViewsphereError if the cluster is gone."""
+        """Like `WorkerPool.run`; `report` is called from time to time. Raises ViewsphereError if the cluster is gone."""
         try:
             yield from self._run(work, report)
         except ConnectionError as error:
@@ -131,7 +131,7 @@ class RayPool:
             worker.give(job)
 
     def _look(self, left: int) -> None:
-        """See how far the workers are, and start others where there are CPUs for them, no more than there are jobs left."""
+        """Query the workers' progress, and start workers on free CPUs, but no more than there are jobs left."""
         self._looked = time.monotonic()
         for worker in self._pool:
             worker.ask()
@@ -148,7 +148,7 @@ class RayPool:
         wanted = left - sum(not worker.is_ready for worker in self._pool)
         if self._most:
             wanted = min(wanted, self._most - len(self._pool))
-        for _, node in sorted(places)[: max(wanted, 0)]:  # machines in turns
+        for _, node in sorted(places)[: max(wanted, 0)]:  # alternating between machines
             self._pool.append(_Worker(node, nodes[node][0], self._shared))
 
     def _answering(self) -> list[_Worker]:
@@ -159,7 +159,7 @@ class RayPool:
         return _ready(awaited, "ref", TICK)
 
     def _receive(self, worker: _Worker, queue: Queue) -> Iterator[Outcome]:
-        """Take one answer, or the news of a death."""
+        """Receive one answer, or handle a worker's death."""
         job, worker.job = worker.job, None
         if job is not None:
             self._begun.pop(job.key, None)
@@ -184,13 +184,13 @@ class RayPool:
             yield news
 
     def _lose(self, worker: _Worker) -> None:
-        """A worker that is gone, or that nobody can reach, is done with."""
+        """Give up a worker that is gone or unreachable."""
         self._pool.remove(worker)
         with suppress(RayError):
             ray.kill(worker.actor)
 
     def _suspect(self, worker: _Worker, error: RayError) -> None:
-        """Leave a machine out where workers cannot start, though it is there."""
+        """Leave out a machine that is available but on which workers cannot start."""
         if worker.node not in _nodes():
             return
         self._failures[worker.node] += 1
@@ -199,7 +199,7 @@ class RayPool:
 
 
 class _Worker:
-    """One worker, seen from here; `ref` is what it answers next, first of all that it is ready."""
+    """This process's handle for one worker; `ref` is its next answer, at first that it is ready."""
 
     def __init__(self, node: str, address: str, shared: Any) -> None:
         self.node, self.address = node, address
@@ -212,16 +212,16 @@ class _Worker:
 
     @property
     def is_idle(self) -> bool:
-        """Return whether it has started, and does nothing."""
+        """Return whether it has started and has no job."""
         return self.job is None and self.is_ready
 
     def give(self, job: Job) -> None:
-        """Have it do a job."""
+        """Give it a job."""
         self.job, self.line = job, job.line
         self.ref = self.actor.do.remote(job)
 
     def ask(self) -> None:
-        """Ask how far it is with its job, unless it has not answered that yet."""
+        """Query its progress with its job, unless the last query has no answer yet."""
         if self.job is not None and self.asked is None:
             self.asked = self.actor.begun.remote()
 
@@ -230,7 +230,7 @@ class _Worker:
         ref, self.asked = self.asked, None
         try:
             return ray.get(ref)
-        except RayError:  # its death is report of by its job
+        except RayError:  # its death is reported with its job
             return "", 0
 
 
@@ -244,7 +244,8 @@ class _Actor:
         self._is_compiled = False
 
     def ready(self) -> None:
-        """Begin. Raises StoreError for a machine without the data set, or whose viewsphere would render another one."""
+        """Start. Raises StoreError for a machine without the data set, or whose viewsphere would render a different data set.
+        """
         from viewsphere.run.opening import check_whether_same
         from viewsphere.run.shots.tasks import Worker
         from viewsphere.run.workers.allocator import keep_freed_memory
@@ -262,13 +263,13 @@ class _Actor:
         self._worker = Worker(self._root, self._portion)
 
     def do(self, job: Job) -> Outcome | str:
-        """Do a job; of all workers of a machine that has no kernels yet, one compiles them."""
+        """Do a job; if a machine has no kernels yet, one of its workers compiles them."""
         from viewsphere.store import Row
 
         assert self._worker is not None
         self._key, self._frames = job.key, 0
         if isinstance(job.task, Row) and not self._is_compiled:
-            with suppress(UserError):  # which the job itself says
+            with suppress(UserError):  # which the job itself reports
                 self._worker.compile_for(job.task)
             self._is_compiled = True
         return answer(self._worker, job, self._count)
@@ -282,19 +283,19 @@ class _Actor:
         return self._key, self._frames
 
 
-_remote: Any = ray.remote  # whose types lack groups
+_remote: Any = ray.remote  # its types lack concurrency groups
 _ACTOR: Any = _remote(num_cpus=1, max_restarts=0, max_task_retries=0, concurrency_groups={"asking": 1})(_Actor)
 
 
 def _connect(address: str) -> None:
-    """Raises UserError where no cluster answers, MissingExtraError where a part of Ray is not installed."""
+    """Connect to a cluster. Raises UserError if no cluster answers, MissingExtraError if a part of Ray is not installed."""
     before = signal.getsignal(signal.SIGTERM)
     try:
         if address != "auto":
             _reach(address)
         for left in reversed(range(CALLS)):
             try:
-                with warnings.catch_warnings(action="ignore"):  # of what Ray will do in the future
+                with warnings.catch_warnings(action="ignore"):  # about future changes in Ray
                     ray.init(address, log_to_driver=False, logging_level=logging.ERROR)
                 return
             except ConnectionError:
@@ -314,13 +315,13 @@ def _connect(address: str) -> None:
 
 
 def _reach(address: str) -> None:
-    """Raises OSError, OverflowError or ValueError where nobody listens, which Ray itself would not notice for minutes."""
+    """Raise OSError, OverflowError or ValueError if no server listens there, which Ray itself would not notice for minutes."""
     host, _, port = address.removeprefix("ray://").rpartition(":")
     socket.create_connection((host.strip("[]"), int(port)), timeout=GRACE).close()
 
 
 def _nodes() -> dict[str, tuple[str, int]]:
-    """The machines of the cluster with CPUs: each one's address and how many it has, by its id."""
+    """The address and the number of CPUs of each machine of the cluster with CPUs, by its id."""
     found = ((node, int(node["Resources"].get("CPU", 0))) for node in ray.nodes() if node["Alive"])
     return {node["NodeID"]: (str(node["NodeManagerAddress"]), cpus) for node, cpus in found if cpus}
 
@@ -343,7 +344,7 @@ def _settings() -> dict[str, str]:
 
 
 def _first_line(error: BaseException) -> str:
-    """Of the error that Ray tells of, if it tells of another's; what follows a colon is told by the last line."""
+    """The first line of an error, or of the error that Ray wraps. If it ends with a colon, the last line is added."""
     cause = getattr(error, "cause", None)
     lines = [line.strip() for line in str(cause if isinstance(cause, Exception) else error).splitlines() if line.strip()]
     if not lines:

@@ -1,4 +1,4 @@
-"""A data set with labels that it does not keep: they are computed of its shots and models when they are asked for."""
+"""A data set with labels that it does not store: they are computed from its shots and models at the first access."""
 
 from __future__ import annotations
 
@@ -23,11 +23,11 @@ from viewsphere.store import Choice, Dataset, Exported
 
 
 def lacking(dataset: Dataset, spec: FormatSpec, entry: FormatEntry) -> tuple[str, ...]:
-    """The labels that a format needs and a part of a data set does not keep, all of which can be computed of its shots; none of
-    a data set without shots, such as an imported one, of which formats take what there is.
+    """The labels that a format needs, that a part of a data set does not store, and that its shots allow to compute. There are
+    none for a data set without shots, such as an imported one, from which formats take the existing labels.
 
-    Raises UserError for those that cannot: passes, which an engine has to paint, points that a recipe has to name, and any of
-    pictures that were imported among others.
+    Raises UserError for labels that cannot be computed: passes, which an engine has to paint; points, which a recipe has to
+    name; and any label if only some of the pictures were imported.
     """
     wanted, names, unknown = needs_of(spec, entry), dict[str, None](), dict[str, None]()
     shots = dataset.shots_of_parts
@@ -55,7 +55,8 @@ def lacking(dataset: Dataset, spec: FormatSpec, entry: FormatEntry) -> tuple[str
 
 
 class Completed(Exported):
-    """A data set whose samples have labels of these names, too, and lack annotations of what is seen no more than `least`."""
+    """A data set whose samples also have the named labels, without annotations of objects whose visibility is at most `least`.
+    """
 
     def __init__(
         self, root: str | os.PathLike[str], choice: Choice | None, least: float | None, names: tuple[str, ...]
@@ -67,14 +68,14 @@ class Completed(Exported):
         return type(self), (self.root, self.choice, self.least, self._names)
 
     def shown(self, sample: Sample) -> Sample:
-        """A sample with the labels that are computed."""
+        """A sample with the computed labels."""
         wanted = [name for name in self._names if name not in sample.channels and name not in sample.requested]
         return super().shown(self._with(sample, wanted) if wanted else sample)
 
     @cached_property
     def reconstructor(self) -> ViewReconstructor:
         """The reconstructed views of the data set's sensors; several data sets of one root may share them."""
-        whole = Dataset(self.root)  # chosen or not, and with what is hidden
+        whole = Dataset(self.root)  # all frames, with hidden annotations
         return ViewReconstructor(whole, Scenery(whole), {info.key: info for info in whole.models})
 
     def _with(self, sample: Sample, names: list[str]) -> Sample:
@@ -105,7 +106,7 @@ class Completed(Exported):
 
 
 class _Computed(Mapping[str, NDArray[Any]]):
-    """A sample's channels, and others that are computed when they are first asked for."""
+    """A sample's channels, and other channels, which are computed at the first access."""
 
     def __init__(self, kept: Mapping[str, NDArray[Any]], names: list[str], context: Callable[[], LabelContext]) -> None:
         self._kept, self._names, self._context = kept, names, context
@@ -119,7 +120,7 @@ class _Computed(Mapping[str, NDArray[Any]]):
         return self._made[name]
 
     def __contains__(self, name: object) -> bool:
-        """Without reading or computing it."""
+        """Return whether there is such a channel, without reading or computing it."""
         return name in self._kept or name in self._names
 
     def __iter__(self) -> Iterator[str]:

@@ -1,4 +1,4 @@
-"""A data set on disk in other formats: one pass over its samples for all of them."""
+"""The export of a data set on disk to other formats, in one pass over its samples."""
 
 from __future__ import annotations
 
@@ -31,15 +31,14 @@ def export(
     workers: int = 0,
     listener: Listener | None = None,
 ) -> tuple[str, ...]:
-    """Write the finished frames of a data set in these formats, each to OUT/<format>, or OUTPUT/<format>; gives notes for the
-    user. A format is its name, or {name: {option: value}}; options that are not said are those of the export in the data set's
-    folder, else its recipe's, else the format's defaults.
+    """Write the finished frames of a data set in these formats, each to OUT/<format> or OUTPUT/<format>; returns notes for the
+    user. A format is its name, or {name: {option: value}}. Missing options come from the export in the data set's folder, else
+    from its recipe, else from the format's defaults.
 
-    Where that takes long, so many processes help; fewer than two do not, and more need a `__main__` guard in the
-    calling script. The folders are put in place, and take that of older exports, only when all are whole; an export of all
-    frames is not replaced by one of a choice of them. Raises UserError for an unknown format or a choice without output or
-    frames, StoreError if `out` is no data set or one of the folders cannot be written, WorkerDied where one of the processes
-    is killed.
+    A long export is shared among `workers` processes if there are two or more, which need a `__main__` guard in the calling
+    script. The folders replace older exports only when all are complete; a partial export never replaces an export of all
+    frames. Raises UserError for an unknown format or a selection without output or frames. Raises StoreError if `out` is not a
+    data set or a folder cannot be written, WorkerDied if a process is killed.
     """
     dataset = Dataset(out, choice)
     place = dataset.root if output is None else located(output)
@@ -86,15 +85,15 @@ def _folder(dataset: Dataset, target: Path, is_own: bool) -> AbstractContextMana
 
 
 def _known_options(dataset: Dataset, name: str) -> Mapping[str, JsonValue]:
-    """The options that a data set's export was written with, or that its recipe says."""
+    """The options of a data set's existing export, or else of its recipe."""
     said: Formats = dataset.recipe.get("formats", ())
     return written_options(dataset.root / name) or options_of(read_formats(said)).get(name, {})
 
 
 def write(dataset: Dataset, formats: Entries, tell: Listener = null_listener, workers: int = 0) -> tuple[str, ...]:
-    """Write the data set in formats, each once, into these empty folders; gives notes for the user. `workers` as for `export`.
+    """Write the data set in formats, each once, into these empty folders; returns notes for the user. `workers`: see `export`.
 
-    Every sample is read once, and so is each of its channels. At last the digests of all files are listed, with the options.
+    Every sample and each of its channels is read once. Finally the digests of all files are listed, with the options.
     """
     if not formats:
         return ()
@@ -118,17 +117,15 @@ def write(dataset: Dataset, formats: Entries, tell: Listener = null_listener, wo
 
 
 def is_written(entry: FormatEntry, dataset: Dataset, least: float | None) -> bool:
-    """Return whether a format's export in a data set's folder is what would be written now, as far as its list of files
-    says.
-    """
+    """Return whether a format's export in a data set's folder equals what would be written now, judged by its list of files."""
     folder = dataset.root / entry.name
     is_whole = written_frames(folder) == len(dataset) and written_options(folder) == entry.whole().options
     return is_whole and not is_out_of_date(entry.name, dataset, least)
 
 
 def is_out_of_date(name: str, dataset: Dataset, least: float | None) -> bool:
-    """Return whether a format's export in a data set's folder lacks frames that are there, keeps other annotations than those
-    of what is seen more than `least`, or names other credits than those that are known now.
+    """Return whether a format's export in a data set's folder is out of date. It is if it lacks finished frames, was written
+    with another visibility threshold than `least`, or has other credits than those known now.
     """
     spec, folder = plugins.load(FormatSpec, name), dataset.root / name
     if written_frames(folder) not in (None, len(dataset)) or (not spec.keeps_all_objects and written_least(folder) != least):
@@ -137,7 +134,7 @@ def is_out_of_date(name: str, dataset: Dataset, least: float | None) -> bool:
 
 
 def _check_choice(dataset: Dataset, is_own: bool) -> None:
-    """Raise UserError for a choice that would take the place of an export of everything, or that leaves nothing."""
+    """Raise UserError for a selection of frames that is empty or that would replace an export of all frames."""
     if dataset.choice.is_some and is_own:
         raise UserError("--output: expected another folder than the data set's, beside --models or --frames; found none")
     if dataset.choice.is_some and not len(dataset):

@@ -1,4 +1,4 @@
-"""Samples as formats want them: read once for all formats, and prepared, where that takes long, by several processes."""
+"""The preparation of samples for formats. Samples are read once for all formats; several processes share long preparations."""
 
 from __future__ import annotations
 
@@ -25,23 +25,23 @@ if TYPE_CHECKING:
     from viewsphere.run.exports.completed import Completed
 
 PATIENCE_S, WORTH_S = 2.0, 8.0
-"""Seconds after which this process looks how long it would take for what is left; and for how many of them others help, each
-of which takes one or two to start.
+"""Seconds after which this process estimates its remaining time, and the remaining seconds from which other processes help,
+each of which takes one or two seconds to start.
 """
 
 LOT, LONGEST = 32, 256
-"""Frames that a worker is given at once, at least as long as there are so many; and most of one shot, whose records are read
-again for the next."""
+"""Minimum number of frames that a worker gets at once, if enough are left, and maximum number from one shot, whose records are
+read again for the next lot."""
 
 Lot = tuple[tuple[str, Sequence[int]], ...]
-"""Shots by their keys, and which of their frames."""
+"""Shots by their keys, each with the indices of frames."""
 
 Entries = Sequence[tuple[FormatEntry, Path]]
-"""Formats and the folders that they are written into."""
+"""Formats with their output folders."""
 
 
 class Views:
-    """A data set as formats see it: one for all that leave the same annotations out, and lack the same labels."""
+    """Views of a data set for formats. Formats that leave out the same annotations and lack the same labels share one view."""
 
     def __init__(self, dataset: Dataset) -> None:
         self._dataset = dataset
@@ -49,8 +49,8 @@ class Views:
         self._completed: Completed | None = None
 
     def of(self, entry: FormatEntry, least: float | None) -> Dataset:
-        """The data set with the labels that a format needs, and without annotations of what is seen no more than `least`, but
-        for a format that writes scenes. Raises UserError for needs that cannot be met.
+        """The data set with the labels that a format needs, without annotations of objects whose visibility is at most `least`.
+        A format that writes scenes keeps all annotations. Raises UserError for needs that cannot be met.
         """
         from viewsphere.run.exports.completed import lacking  # which loads what reads and draws models
 
@@ -66,7 +66,7 @@ class Views:
         if names:
             shown = Completed(root, choice, least, names)
             self._completed = self._completed or shown
-            shown.reconstructor = self._completed.reconstructor  # so that formats which need the same see it once
+            shown.reconstructor = self._completed.reconstructor  # shared, so that views are reconstructed once
         else:
             shown = Exported(root, choice, least)
         shown.link_kinds, shown.made = self._dataset.link_kinds, self._dataset.made
@@ -75,7 +75,7 @@ class Views:
 
 @dataclass(frozen=True, eq=False)
 class Target:
-    """A format that is written into a folder, and the data set as the format sees it."""
+    """A format with its output folder and its view of the data set."""
 
     entry: FormatEntry
     folder: Path
@@ -89,11 +89,13 @@ class Target:
 
     @property
     def prepares(self) -> bool:
-        """Return whether the format makes anything of samples before they are added."""
+        """Return whether the format prepares samples before they are added."""
         return self.spec.preparer is not None
 
     def preparer(self) -> Callable[[Sample], Any]:
-        """Makes of a sample what the format adds: the sample itself, as the format sees it, where it prepares nothing."""
+        """The function that prepares a sample for the format; if the format prepares nothing, it returns the format's view of
+        it.
+        """
         preparer = self.spec.preparer
         with self._named():
             make = preparer(self.view, self.folder, *self.entry.arguments()) if preparer else None
@@ -106,8 +108,8 @@ class Target:
 
     @contextmanager
     def _named(self) -> Generator[None]:
-        """Tell the user's mistakes with the data set and the format, which what they come from may not know; those of a stored
-        file stay as they are.
+        """Add the data set and the format to the user's errors, whose origin may not know them; errors of stored files do not
+        change.
         """
         try:
             yield
@@ -119,8 +121,8 @@ class Target:
             raise type(error)(f"{where}format {name}: {problem}") from None
 
     def _seen(self, sample: Sample) -> Sample:
-        """The sample as the format sees it; raises UserError where a sensor keeps less than all channels, and lacks one that
-        the format needs of every frame.
+        """The format's view of the sample; raises UserError if the sample's sensor lacks a channel that the format needs for
+        every frame.
         """
         shown = self.view.shown(sample)
         absent = missing(self.spec.channels or (), {*shown.channels, *shown.requested})
@@ -134,15 +136,15 @@ class Target:
 
 
 def targets(dataset: Dataset, formats: Entries) -> tuple[Target, ...]:
-    """The formats to be written of a data set."""
+    """The formats to be written from a data set."""
     views, least = Views(dataset), dataset.plan.keep_annotations_above
     specs = ((entry, folder, plugins.load(FormatSpec, entry.name)) for entry, folder in formats)
     return tuple(Target(entry, folder, spec, views.of(entry, least)) for entry, folder, spec in specs)
 
 
 def prepared(dataset: Dataset, found: Sequence[Target], workers: int = 0) -> Generator[dict[str, Any]]:
-    """For each sample in frame order what each format, by its name, adds of it. Where this takes long, so many processes do
-    what can be done of a sample anywhere; what comes out is the same.
+    """For each sample in frame order the prepared data of each format, by its name. If this takes long, `workers` processes
+    share the preparation; the result is the same.
     """
     alone, own = _Preparation(dataset, found), _Preparation(dataset, [one for one in found if not one.prepares])
     shared = [(one.entry, one.folder) for one in found if one.prepares]
@@ -186,7 +188,7 @@ def _samples(dataset: Dataset, lot: Lot) -> Iterator[Sample]:
 
 
 def _lots(shots: Iterator[tuple[str, Sequence[int]]]) -> Iterator[Lot]:
-    """The shots in lots of at least `LOT` frames; long ones are cut."""
+    """The shots in lots of at least `LOT` frames; long shots are cut."""
     lot: list[tuple[str, Sequence[int]]] = []
     for key, places in shots:
         for at in range(0, len(places), LONGEST):

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from viewsphere.store.foreign import ForeignDataset
 
 LOOKED_AT = 1000
-"""Pictures of a part that are asked what is known of them: many data sets have no cameras at all."""
+"""Maximum number of pictures of a part that are examined for known facts: many data sets have no cameras at all."""
 
 
 def scope_of_plan(planned: Plan, channels: Sequence[str]) -> Scope:
@@ -77,8 +77,8 @@ def scope_of_foreign(foreign: ForeignDataset) -> Scope:
 
 
 def telling(samples: Iterable[Sample]) -> tuple[Sample, ...]:
-    """The first of the samples, and the first of each kind of which more or less is known: a camera, a viewpoint, where an
-    object is. No more than LOOKED_AT of them are asked.
+    """The first sample, and the first sample for each other combination of known facts: a camera, a viewpoint, an object's
+    position. At most LOOKED_AT samples are examined.
     """
     kinds: dict[tuple[bool, bool, bool], Sample] = {}
     for sample in islice(samples, LOOKED_AT):
@@ -88,7 +88,7 @@ def telling(samples: Iterable[Sample]) -> tuple[Sample, ...]:
 
 
 def needs_of(spec: FormatSpec, entry: FormatEntry) -> tuple[str, ...]:
-    """The channels and the labels on request that a format reads as these options want it."""
+    """The channels and the labels on request that a format reads with these options."""
     more = spec.needs(*entry.arguments()) if spec.needs is not None else ()
     return tuple(dict.fromkeys((*(spec.channels or ()), *more)))
 
@@ -103,7 +103,7 @@ def is_computed(name: str) -> bool:
 
 
 def refuse(entries: Sequence[FormatEntry], scope: Scope, where: object) -> None:
-    """Raise UserError with a line for each of the formats that cannot hold the data set at `where`: all that it cannot."""
+    """Raise UserError with a line for each format that cannot hold the data set at `where`, with all reasons."""
     found = {e.name: list(refusals(plugins.load(FormatSpec, e.name), e, scope)) for e in entries}
     lines = [f"{where}: format {name}: {', and '.join(problems)}" for name, problems in found.items() if problems]
     if lines:
@@ -119,13 +119,13 @@ def refusals(spec: FormatSpec, entry: FormatEntry, scope: Scope) -> Iterator[str
 
 
 def not_held(spec: FormatSpec, entry: FormatEntry, scope: Scope) -> Iterator[str]:
-    """The same but for a LiDAR's frames, which a run that is planned tells by its sensors' channels."""
+    """Yield the same reasons except for a LiDAR's frames, which a planned run checks by its sensors' channels."""
     if spec.refuses is not None:
         yield from spec.refuses(scope, *entry.arguments())
 
 
 def _pointless(spec: FormatSpec, entry: FormatEntry, scope: Scope) -> Iterator[str]:
-    """Of a format of pictures: a LiDAR, whose frames are none."""
+    """Yield the reason why a format of pictures cannot hold a LiDAR's frames, which are not pictures."""
     needed = [name for name in needs_of(spec, entry) if name in PASSES]
     for sensor in scope.rig.sensors if scope.rig else ():
         lacking = missing(needed, sensor.kept(scope.channels))

@@ -1,4 +1,4 @@
-"""Channels that take much of the disk, and that no format of a run uses."""
+"""Channels that no format of a run uses but that take much disk space."""
 
 from __future__ import annotations
 
@@ -18,18 +18,18 @@ from viewsphere.store import Store
 from viewsphere.store.shots.manifest import Manifest
 
 LARGE = 0.5
-"""From this share of the frames' bytes on, channels that no format uses are told."""
+"""Share of the frames' bytes from which channels that no format uses are reported."""
 
 WORTH_NAMING = 0.05
-"""Of the frames' bytes: what a channel takes that is worth to be left out."""
+"""Share of the frames' bytes from which a single channel is named."""
 
 MOST_SHOTS = 100
-"""Shots whose files are added up."""
+"""Maximum number of shots whose files are added up."""
 
 
 @dataclass(frozen=True)
 class Unused:
-    """Channels, the largest first, that none of the formats uses, and their share of the bytes of all channels."""
+    """Channels that none of the formats uses, largest first, and their share of the bytes of all channels."""
 
     channels: tuple[str, ...]
     share: float
@@ -45,13 +45,13 @@ class Unused:
 
 
 def unused(store: Store, formats: Iterable[FormatEntry]) -> Unused | None:
-    """The channels of finished shots that none of these formats uses; None where these take little, or there is no format."""
+    """The channels of finished shots that none of these formats uses; None if they take little space, or without formats."""
     entries = tuple(formats)
     return among(channel_bytes(store), entries) if entries else None
 
 
 def among(sizes: Counter[str], formats: Sequence[FormatEntry]) -> Unused | None:
-    """The channels that none of these formats uses, of channels of so many bytes; None where these take little."""
+    """The channels that none of these formats uses, given the bytes of each channel; None if they take little space."""
     total = sizes.total()
     left = [name for name, size in sizes.most_common() if size >= WORTH_NAMING * total and not _is_used(name, formats)]
     share = sum(sizes[name] for name in left) / total if total else 0.0
@@ -59,19 +59,19 @@ def among(sizes: Counter[str], formats: Sequence[FormatEntry]) -> Unused | None:
 
 
 def channel_bytes(store: Store) -> Counter[str]:
-    """Bytes of each channel in some of the finished shots, as their manifests say; what is damaged is left out."""
+    """Bytes of each channel in some of the finished shots, from their manifests, without damaged shots."""
     sizes: Counter[str] = Counter()
     for key in islice(store.finished(), MOST_SHOTS):
-        with suppress(StoreError):  # `check` is what tells of damage
+        with suppress(StoreError):  # `check` reports damage
             for path, (size, _) in Manifest.read(store.shot_folder(key)).seals.items():
                 sizes[path.rpartition("/")[0]] += size
-    del sizes[""]  # records are no channel
+    del sizes[""]  # records are not a channel
     return sizes
 
 
 def _is_used(channel: str, formats: Iterable[FormatEntry]) -> bool:
-    """Return whether it is a picture, or one of the formats needs it, or does not say what it needs: such a format takes
-    all.
+    """Return whether a channel is a picture or one of the formats needs it. A format that does not declare its needs takes all
+    channels.
     """
     specs = ((plugins.load(FormatSpec, entry.name), entry) for entry in formats)
     return channel in PICTURES or any(spec.channels is None or channel in needs_of(spec, entry) for spec, entry in specs)

@@ -1,4 +1,4 @@
-"""The formats that data sets can be written in."""
+"""The formats for writing data sets."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ from viewsphere.validation.errors import one_of
 
 
 def writable_formats() -> tuple[str, ...]:
-    """Names of the formats that data sets can be written in; others are only read."""
+    """Names of the formats that can be written; other formats are only read."""
     return tuple(name for name, spec in plugins.loadable(FormatSpec).items() if spec.writer)
 
 
 def writable(name: str, field: str = "format") -> FormatSpec:
-    """The format of this name; raises UserError for one that does not work here, and, as a mistake of `field`, for one that is
-    not known or only read.
+    """The format of this name. Raises UserError for a format that does not work here, and, as an error of `field`, for a format
+    that is unknown or only read.
     """
     spec = plugins.load(FormatSpec, name) if name in plugins.names("formats") else None
     if spec is None or spec.writer is None:

@@ -1,4 +1,4 @@
-"""The list of formats, with the facts by which users choose a format."""
+"""The list of formats, with facts that help users choose a format."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from viewsphere.plugins.format import FormatSpec
 
 @dataclass(frozen=True)
 class Listed:
-    """A format: its first sentence, the labels and passes that it always needs, what it holds, what reads it, its options, and
-    whether it can be written, and imported.
+    """A format: its first sentence, the labels and passes that it always needs, its content, the tools that read it, its
+    options, and whether it can be written and imported.
     """
 
     name: str
@@ -25,7 +25,7 @@ class Listed:
 
 
 def listed() -> tuple[Listed, ...]:
-    """Return all installed formats, by their names."""
+    """Return all installed formats, sorted by name."""
     return tuple(_listed(name, spec) for name, spec in plugins.loadable(FormatSpec).items())
 
 

@@ -24,9 +24,9 @@ def model_spec(
     unit: str | None = None,
     seed: int = 0,
 ) -> ModelSpec:
-    """A model file or `zoo:car` with the settings given, the others by default.
+    """A model file or `zoo:car` with the given settings, and defaults for the others.
 
-    Raises UserError for something that is no axis or no unit.
+    Raises UserError for an invalid axis or unit.
     """
     for name, axis in (("up", up), ("forward", forward)):
         if axis is not None and axis not in get_args(Axis):
@@ -46,7 +46,7 @@ def model_spec(
 
 
 def _metres(unit: str) -> float:
-    """Metres in a unit as recipes name it: by name or by number."""
+    """The length in metres of a unit as in recipes: a name or a number."""
     try:
         metres = unit_metres(unit) if unit in UNITS else float(unit)
     except ValueError:
@@ -62,7 +62,7 @@ def inspect_model(spec: ModelSpec) -> ModelReport:
 
 
 def report_lines(report: ModelReport) -> Iterator[str]:
-    """The report as lines of text."""
+    """The lines of the report."""
     width, height, length = report.size
     raw = " x ".join(f"{x:.4g}" for x in report.raw_size)
     yield f"{report.source} ({report.format})"
@@ -105,7 +105,7 @@ def _keypoints(report: ModelReport) -> Iterator[str]:
 
 
 def _symmetries(report: ModelReport) -> Iterator[str]:
-    """Yield the lines about symmetries: their number, and detected ones in the form of a sidecar."""
+    """Yield the lines about symmetries: their number, and detected symmetries in the form of a sidecar."""
     discrete, continuous = report.symmetries["discrete"], report.symmetries["continuous"]
     kinds = [f"{len(discrete)} rotation{'s' if len(discrete) > 1 else ''}"] if discrete else []
     kinds += [f"round about {len(continuous)} {'axes' if len(continuous) > 1 else 'axis'}"] if continuous else []

@@ -1,4 +1,4 @@
-"""The list of installed plug-ins, and of those that cannot be loaded."""
+"""The list of installed plug-ins, including those that cannot be loaded."""
 
 from __future__ import annotations
 
@@ -47,8 +47,8 @@ SPECS: tuple[type[Spec | LensSpec], ...] = (
 
 @dataclass(frozen=True)
 class Installed:
-    """A plug-in, the distribution that it comes from, with its version, and why it cannot be loaded (None: it can). Of a
-    package of no kind, `kind` is the group of its entry point.
+    """A plug-in, its distribution with the version, and the reason why it cannot be loaded (None: it can). For a package
+    without a kind, `kind` is the group of its entry point.
     """
 
     kind: str

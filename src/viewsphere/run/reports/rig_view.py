@@ -35,19 +35,19 @@ COLORS = {
     "olive": (0.5, 0.5, 0.02),
     "cyan": (0.01, 0.5, 0.6),
 }
-"""Of the sensors, one after another; linear."""
+"""Colours of the sensors in turn; linear."""
 
 DEPTH = 0.75
 """Length of a frustum's edges, times the largest distance between two sensors."""
 
 LEAST_DEPTH = 0.1
-"""Metres."""
+"""Minimum length of a frustum's edges, metres."""
 
 BAR, BODY = 0.012, 0.1
 """Thickness of a frustum's edges and width of a camera's body, times the length of the edges."""
 
 ALONG = 8
-"""Pieces of each side of a picture's border, which lenses bend."""
+"""Number of segments of each side of a picture's border, which lenses bend."""
 
 
 @dataclass(frozen=True)
@@ -65,7 +65,7 @@ class SensorFacts:
 
 
 def recipe_rig(recipe: Recipe) -> Rig:
-    """The rig that a recipe means, of one camera where it has none; no model is read. Raises RecipeError as `rig_of`."""
+    """The rig of a recipe, with one camera if the recipe has no rig; no model is read. Raises RecipeError as `rig_of`."""
     with recipe.located():
         asked = recipe.camera.of_viewpoints
         views = poses_of(recipe.viewpoints, recipe.time, recipe.seed, recipe.folder) if asked else None
@@ -97,7 +97,7 @@ def _angles(pose: Float) -> tuple[float, float, float]:
 
 
 def rig_lines(rig: Rig) -> Iterator[str]:
-    """The rig as lines of text."""
+    """The lines of text about the rig."""
     facts = sensor_facts(rig)
     yield quantity(len(facts), "sensor")
     for one in facts:
@@ -114,7 +114,7 @@ def rig_lines(rig: Rig) -> Iterator[str]:
 
 
 def rig_mesh(rig: Rig) -> Mesh:
-    """The sensors' bodies and frusta, each in a colour of its own, one part each; front -Y, up +Z, metres."""
+    """The sensors' bodies and frusta, a separate colour and part for each sensor; front -Y, up +Z, metres."""
     centers = np.array([np.array(sensor.rig_from_sensor)[:3, 3] for sensor in rig.sensors])
     reach = float(np.linalg.norm(centers[:, None] - centers[None], axis=-1).max())
     depth = max(DEPTH * reach, LEAST_DEPTH)
@@ -139,12 +139,12 @@ def rig_mesh(rig: Rig) -> Mesh:
 
 
 def _in_model_axes(points: Float) -> Float:
-    """Points of the rig's axes as a model's, whose front is -Y: a turn."""
+    """Points in the rig's axes, rotated into a model's axes, whose front is -Y."""
     return np.stack([-points[..., 0], -points[..., 2], -points[..., 1]], axis=-1)
 
 
 def _camera_shape(own: Intrinsics, depth: float) -> Float:
-    """Triangles (T, 3, 3) of a sensor in its own axes: its body, the edges of what it sees, and a mark above its upper side."""
+    """Triangles (T, 3, 3) of a sensor in its own axes: its body, the edges of its frustum, and a mark above its upper side."""
     border = [depth * _unit(rays) for rays in _borders(own)]
     thick, body = BAR * depth, BODY * depth
     bars = [_bar(a, b, thick) for side in border for a, b in pairwise(side)]

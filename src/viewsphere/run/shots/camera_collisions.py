@@ -1,4 +1,4 @@
-"""Cameras that cannot be where they are: inside a thing, outside the model's room, or on a way through a wall."""
+"""The detection of cameras in impossible places: inside a thing, outside the model's room, or moving through a wall."""
 
 from __future__ import annotations
 
@@ -31,21 +31,21 @@ DIRECTIONS = 64
 Float = NDArray[np.float64]
 
 Step = tuple[int, Float, Float]
-"""The number of a frame, and where a camera is then and in the next one, (3,) each, world metres."""
+"""The number of a frame, and the camera's positions in this frame and the next, (3,) each, world metres."""
 
 WALLS = {STUFF_IDS[name] for name in ("building", "wall", "floor", "ceiling")}
-"""Classes of scenery that nobody goes through: leaves and hedges are none."""
+"""Classes of scenery that cameras must not pass through; leaves and hedges do not count."""
 
 MOST_CAMERAS = 1000
-"""Cameras that are looked at before rendering; the others are when their turn comes."""
+"""Number of cameras checked before rendering; the rest are checked in their turn."""
 
 MOST_SKY = 0.8
-"""Share of the sky that scenery may hide from a camera that is not inside of it."""
+"""Maximum share of the sky that scenery may hide from a camera outside the scenery."""
 
 
 @dataclass(frozen=True, eq=False)
 class _Stand:
-    """The place of a still thing: its box (8, 3), and those of its rooms, world metres."""
+    """The place of a static thing: its box (8, 3), and the boxes of its rooms, world metres."""
 
     box: Float
     rooms: tuple[Float, ...]
@@ -57,28 +57,28 @@ NONE_KNOWN: Mapping[int, _Stand] = MappingProxyType({})
 
 @dataclass(frozen=True, eq=False)
 class CameraChecks:
-    """Checks whether the cameras of shots can be where they are: not inside things, not beyond walls."""
+    """Checks that the cameras of shots are neither inside things nor beyond walls."""
 
     stages: Stages
 
     def check_distances(self, planned: Plan, subject: str) -> None:
-        """Raise RecipeError if a pose's camera would stand inside what stands in a subject's frames."""
+        """Raise RecipeError if a pose's camera would be inside a thing in a subject's frames."""
         problem = Distances(planned, self.stages.box).problem(subject)
         with planned.recipe.located():
             if problem:
                 raise problem
 
     def check_scenery(self, planned: Plan) -> None:
-        """Raise RecipeError if a pose's camera would stand in a house, where all models have the same around them.
+        """Raise RecipeError if a pose's camera would be inside a house; only for recipes with the same scenery for all models.
 
-        Scenery that is drawn for each model or frame is looked at when its shot is rendered.
+        Scenery that is drawn for each model or frame is checked when its shot is rendered.
         """
         scene = planned.recipe.scene
         if planned.composition is None or not scene.has_fixed_scenery or is_redrawn(planned.recipe):
             return
         subject = planned.subjects[0]
         there = next(iter(planned.standing(subject, self.stages.box)), None)
-        if there is None or not there.views.are_known:  # where the camera is, is known with its shot
+        if there is None or not there.views.are_known:  # the camera's position is known with its shot
             return
         things = planned.composition.things(subject, there.things, None, self.stages.box)
         poses = range(0, planned.poses, -(-planned.poses // MOST_CAMERAS))
@@ -87,12 +87,12 @@ class CameraChecks:
             self._check_cameras(things, cameras)
 
     def _check_cameras(self, things: Sequence[Thing], cameras: Float, known: Mapping[int, _Stand] = NONE_KNOWN) -> None:
-        """Raise RecipeError for the first of the cameras (N, 3) that is inside of something; known: where some of the things
-        stand, by their identity.
+        """Raise RecipeError for the first of the cameras (N, 3) that is inside a thing; `known` has the places of some of the
+        things, by their identity.
 
-        Inside of a target means its box. Inside of scenery means that it hides the sky from the camera, but not from the
-        frame's model: under a tree, among hills or in the room where the model stands a camera may well be. So cameras are not
-        looked at where no target is there.
+        For a target, inside means inside its box. For scenery, inside means that it hides the sky from the camera but not from
+        the frame's model, because a camera may be under a tree, among hills, or in the model's room. So cameras are not checked
+        in frames without a target.
         """
         own = next((i for i, thing in enumerate(things) if not thing.scenery), None)
         if own is None:
@@ -115,8 +115,8 @@ class CameraChecks:
                     )
 
     def check_shot(self, shot: Shot) -> None:
-        """Raise RecipeError where a camera of a shot is inside of something, or a trajectory leads through a wall; what stands
-        still is looked at once.
+        """Raise RecipeError if a camera of a shot is inside a thing, or a trajectory leads through a wall; static things are
+        checked once.
         """
         instants, sensors = range(len(shot.instants)), range(len(shot.rig.sensors))
         still = {id(thing): self._stand(thing) for thing in shot.things if thing.motion.is_still}
@@ -135,7 +135,7 @@ class CameraChecks:
         return _Stand(transform(pose, self.stages.box(thing.model, thing.step)), rooms)
 
     def check_instant(self, shot: Shot, instant: int) -> None:
-        """Raise RecipeError where a camera of a shot is inside of something at an instant, counted from 0 in the shot."""
+        """Raise RecipeError if a camera of a shot is inside a thing at an instant, counted from 0 in the shot."""
         self.check_shot(shot.model_copy(update={"instants": (shot.instants[instant],), "things": shot.things_at(instant)}))
 
     def _roofs(self, thing: Thing, point: Float) -> bool:
@@ -146,7 +146,7 @@ class CameraChecks:
 
 
 def _steps(shot: Shot) -> list[Step]:
-    """From each frame to the next one, where the shot has both."""
+    """The steps from each frame to the next one, if the shot has both."""
     pairs = enumerate(pairwise(shot.instants))
     return [(a.index, shot.camera(i, 0).center, shot.camera(i + 1, 0).center) for i, (a, b) in pairs if b.index == a.index + 1]
 
@@ -163,9 +163,9 @@ def _check_rooms(rooms: Sequence[Float], model: Float, cameras: Float) -> None:
 
 
 def check_way(things: Iterable[tuple[Thing, Float]], mesh_of: Callable[[Thing], Mesh], steps: Sequence[Step]) -> None:
-    """Raise RecipeError where one of a camera's steps goes straight through a wall.
+    """Raise RecipeError if one of a camera's steps leads straight through a wall.
 
-    `things`: those that stand still, each with its box (8, 3) in the world; `mesh_of`: a thing's mesh in its own axes.
+    `things` are the static things, each with its box (8, 3) in the world; `mesh_of` returns a thing's mesh in its own axes.
     """
     if not steps:
         return
@@ -193,7 +193,7 @@ def _check_wall(thing: Thing, mesh: Mesh, steps: Sequence[Step]) -> None:
 
 
 def _walls(category: str, mesh: Mesh) -> NDArray[np.int32]:
-    """The triangles (T, 3) of scenery that nobody goes through."""
+    """The triangles (T, 3) of scenery that cameras must not pass through."""
     solid = np.array([stuff in WALLS for stuff in stuff_of(category, mesh.parts)], np.bool_)
     return mesh.triangles[solid[mesh.triangle_part]]
 

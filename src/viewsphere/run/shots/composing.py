@@ -1,4 +1,4 @@
-"""Shots of a part, composed of its recipe: for a run that renders them, and for a proof that compares them."""
+"""The composition of a part's shots from its recipe, for runs that render them and for proofs that compare them."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class Composer:
     _digests: dict[str, str] = field(default_factory=dict[str, str])
 
     def shot(self, row: Row) -> Shot:
-        """The shot of a row, with everything that is drawn again until it fits. Raises UserError as `DatasetPart.shot`."""
+        """The shot of a row, after redraws until it fits. Raises UserError as `DatasetPart.shot`."""
         with self.portion.plan.recipe.located():
             return self._framing.shot(row, self._settled(row))
 
@@ -41,7 +41,7 @@ class Composer:
         return Framing(self.portion.plan, self.portion, self.stages, self.boxes)
 
     def _settled(self, row: Row) -> int | None:
-        """The draw of a row's scene in the shots that earlier parts have of it; None where they have none."""
+        """The redraw number of a row's scene in the shots of earlier parts; None if they have no shot of the scene."""
         if not self.portion.number or self.portion.plan.draws == 1:
             return None
         parts = (index for number in range(self.portion.number) for index in self.portion.record.indices_of(number))
@@ -49,7 +49,9 @@ class Composer:
         return next((shot.redraw for shot in shots if shot), None)
 
     def scenery(self, shot: Shot) -> str:
-        """The background of a shot, and digests of its meshes, as `SceneryRecord` reads it; empty without any."""
+        """The background of a shot, and digests of its meshes, in the form that `SceneryRecord` reads; empty without a
+        background.
+        """
         things = tuple(thing for thing in shot.things if thing.id == 0)
         shown = {
             thing.model.key_at(step and step.frame): (thing.model, step) for thing in things for step in thing.motion.steps

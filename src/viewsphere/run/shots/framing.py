@@ -1,8 +1,8 @@
-"""Shots that fit: what is random in a scene, or in a frame, is drawn again where a camera cannot stand, or too little is seen.
+"""Shots that fit: random values of a scene or frame are redrawn if a camera has an invalid place or too little is visible.
 
-The label `visibility` itself, of the whole picture, decides what is seen. A frame's draws follow from its names and the number
-of the try, and it is judged by itself. A scene's draws follow from its names and the number of the redraw, and all of its
-cameras judge it: neither workers nor the cut of shots change what is taken.
+The label `visibility` of the whole picture decides. A frame's random values follow from its names and the number of the try,
+and each frame is judged by itself. A scene's random values follow from its names and the number of the redraw, and all of its
+cameras judge it. So neither the workers nor the division into shots affect the result.
 """
 
 from __future__ import annotations
@@ -33,24 +33,24 @@ from viewsphere.truth.raster.geometry import Geometry
 from viewsphere.truth.shot_views import ShotViews
 
 NO_PLACE = -10.0
-"""Value of a frame whose camera cannot stand there: far below any that misses what is wanted."""
+"""Value of a frame with an invalid camera: far below the value of any frame that misses its targets."""
 
 OUT_OF_VIEW = -1.0
-"""Value of a frame in which no object can be seen, where the recipe does not ask for visibility."""
+"""Value of a frame in which no object can be seen, if the recipe sets no visibility."""
 
 Take = Callable[[Sequence[int], int], Shot]
-"""Makes a shot, each frame at its try, in the first draw of its scene, from a number on, in which all has room."""
+"""Makes a shot from the try of each frame and a redraw number. The scene uses the first redraw from it on with enough room."""
 
 
 class Source(Protocol):
-    """A plan, or a part of a data set, whose shots are made."""
+    """A plan, or a part of a data set, that provides shots."""
 
     def shot(self, row: Row, box_of: BoxOf, redraws: Sequence[int] = (), redraw: int = 0) -> Shot:
         """The shot of a row."""
         ...
 
     def whole(self, row: Row) -> Row | None:
-        """Return all poses of the row's scene in the plan's numbers; None where the row has them."""
+        """Return a row with all poses of the row's scene, in the plan's numbering; None if the row has them already."""
         ...
 
 
@@ -65,10 +65,10 @@ class Framing:
     _scenes: dict[Row, int] = field(default_factory=dict[Row, int])
 
     def shot(self, row: Row, settled: int | None = None) -> Shot:
-        """The shot of a row: its scene in the first draw that fits, and each frame at its first try that shows enough of its
-        models, or at the best. `settled`: the draw of the scene in frames that are there already.
+        """The shot of a row. It uses the first redraw of its scene that fits, and each frame's first try that shows enough of
+        its models, or else the best try. `settled` is the redraw number of the scene in existing frames.
 
-        Raises RecipeError where nothing fits.
+        Raises RecipeError if nothing fits.
         """
         take, whole = self._taker(self.source, row), self.source.whole(row)
         if settled is not None:
@@ -84,7 +84,7 @@ class Framing:
         return lambda redraws, redraw: source.shot(row, self.box_of, redraws, redraw)
 
     def _fitting(self, take: Take, redraw: int, stop: int, is_judged: bool = True) -> Shot:
-        """The shot in the first of its scene's draws that fits; not `is_judged`: only its cameras have to."""
+        """The shot in the first redraw of its scene that fits; without `is_judged`, only its cameras have to fit."""
         problems: list[RecipeError] = []
         while redraw < stop:
             try:
@@ -99,9 +99,9 @@ class Framing:
         raise problems[0]
 
     def _framed(self, take: Take, redraw: int, is_judged: bool) -> tuple[Shot, RecipeError | None]:
-        """The shot in a draw of its scene, and what is wrong with the first of its frames whose camera never fits.
+        """The shot in one redraw of its scene, and the problem of the first frame whose camera never fits.
 
-        Shots of several frames differ by their instants alone, whatever these's tries: the best of each are put together.
+        The tries of a shot differ only in their instants, so the best instants of all tries are combined.
         """
         shot = take((), redraw)
         first = self._problems(shot)
@@ -115,7 +115,7 @@ class Framing:
                 break
             try:
                 other = take([number if i in poor else 0 for i in range(len(best))], shot.redraw)
-            except RecipeError:  # no room for company that a frame draws for itself
+            except RecipeError:  # no room for the frame's own random objects
                 continue
             if other.redraw != shot.redraw:
                 continue
@@ -135,7 +135,7 @@ class Framing:
         try:
             CameraChecks(self.stages).check_shot(shot)
         except RecipeError as error:
-            if len(shot.instants) == 1 or shot.sequence:  # which is drawn as a whole
+            if len(shot.instants) == 1 or shot.sequence:  # a sequence is redrawn as a whole
                 return [error] * len(shot.instants)
             return [self._problem(shot, i) for i in range(len(shot.instants))]
         return [None] * len(shot.instants)
@@ -148,7 +148,7 @@ class Framing:
         return None
 
     def _judge(self, shot: Shot) -> Callable[[Shot, int], float]:
-        """Says how good a frame of such a shot is."""
+        """The function that returns the quality of a frame of such a shot."""
         recipe = self.plan.recipe
         if recipe.wanted is None and recipe.min_visibility is None:
             return partial(_in_view, self.box_of, recipe.scenes is not None)
@@ -183,7 +183,7 @@ def _content(shot: Shot, instant: int) -> float:
 
 
 def _in_view(box_of: BoxOf, together: bool, shot: Shot, instant: int) -> float:
-    """Return whether some object may be in some sensor's picture at an instant, as the corners of its box tell."""
+    """The value of a frame, judged by the corners of the objects' boxes: whether any sensor's picture may show an object."""
     targets = [now for thing in shot.targets(together) if (now := thing.at(instant)).is_there]
     cameras = (shot.camera(instant, sensor) for sensor in range(len(shot.rig.sensors)))
     seen = not targets or any(_may_show(camera, thing, box_of) for camera in cameras for thing in targets)
@@ -191,7 +191,7 @@ def _in_view(box_of: BoxOf, together: bool, shot: Shot, instant: int) -> float:
 
 
 def _may_show(camera: Camera, thing: Thing, box_of: BoxOf) -> bool:
-    """Return whether a camera may show a thing; lenses other than a plain pinhole are taken to show all."""
+    """Return whether a camera may show a thing; any lens but a plain pinhole counts as showing everything."""
     lens = camera.intrinsics
     if not lens.lens.is_linear or lens.skew:
         return True

@@ -1,4 +1,4 @@
-"""Matches: where each pixel's point of one sample is in another, from geometry."""
+"""Matches: the position of each pixel's point in another sample, from geometry."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ from viewsphere.truth.shot_views import views_of
 from viewsphere.truth.view import View
 
 SHOTS = 4
-"""Shots whose things are kept for the next matches."""
+"""Number of shots whose things are cached for the next matches."""
 
 
 @dataclass(frozen=True, eq=False)
 class Matches:
-    """The positions in another picture of the points that each pixel of a picture shows.
+    """The positions of each pixel's point in another picture.
 
     xy (H, W, 2) float64: pixels, NaN where the pixel has none.
     z (H, W) float64: metres along the other camera's axis, infinite for the sky, NaN where there is no pixel.
@@ -42,7 +42,7 @@ class Matches:
 def matches(a: Sample, b: Sample) -> Matches:
     """The matches of each pixel of `a` in `b`: two samples of one sequence, or of still pictures of one subject.
 
-    Raises UserError for other pairs, and StoreError for samples of which nobody knows what was there, imported ones for one.
+    Raises UserError for other pairs, and StoreError for samples with unknown geometry, such as imported ones.
     """
     shots = tuple(map(_shot_of, (a, b)))
     if a.sequence != b.sequence or (not a.sequence and _subject(shots[0]) != _subject(shots[1])):
@@ -84,7 +84,7 @@ def _view(sample: Sample, shot: Shot) -> View:
 
 
 def _meshes(taken: Origin) -> Callable[[Thing], Mesh]:
-    """Gives the mesh of a thing: what was exported of objects of a data set, what sources say of all else."""
+    """The function that returns a thing's mesh: the export for a data set's objects, and the source for everything else."""
 
     def mesh(thing: Thing) -> Mesh:
         if taken.shot is None and thing.id:

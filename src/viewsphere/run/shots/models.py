@@ -1,4 +1,4 @@
-"""Models of a data set: normalised, exported, and compared with those that it holds."""
+"""The models of a data set: normalisation, export, and comparison with the stored models."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ Export = Callable[[Path], None]
 
 @dataclass(frozen=True)
 class Models:
-    """Makes the models of a store, for the data set of this plan."""
+    """Makes the models of a store for this plan's data set."""
 
     store: Store
     stages: Stages
@@ -47,16 +47,16 @@ class Models:
 
     @cached_property
     def _keeps_looks(self) -> bool:
-        """Return whether a label of the data set needs what models look like."""
+        """Return whether a label of the data set needs the appearance of models."""
         asked = {name for part in self.record.parts for name in part.recipe.get("annotations", ())}
         return any(requires(labels()[name].needs, ShotAppearance) for name in asked if name in labels())
 
     def make(self, spec: ModelSpec, steps: Iterable[TimeStep] = (), credit: Credit | None = None, trusted: bool = True) -> None:
-        """Normalise a model, at these time steps if it deforms, and export it into the store, or see that the one there is the
-        same; time steps that it lacks are added, and a credit takes the place of an earlier one.
+        """Normalise a model, at these time steps if it deforms, and export it into the store. If the store has the model, check
+        that it is the same, add missing time steps, and replace its credit.
 
-        `trusted`: the plan's digest and version vouch for models that are there and follow the version. Raises ModelError for a
-        file that cannot be used, StoreError for one that changed since its frames were made.
+        With `trusted`, existing models that follow the version are not compared: the plan's digest and version guarantee them.
+        Raises ModelError for an unusable file, StoreError for a model that changed since its frames were made.
         """
         known, wanted = self.store.model_info(spec.key), _with_rest(spec, steps)
         self._check_key(spec)
@@ -77,8 +77,8 @@ class Models:
         self._write(spec, wanted, credit, self.store.scratch_folder(target) if known is None else self.store.replacing(target))
 
     def mend(self, spec: ModelSpec, steps: Iterable[TimeStep], credit: Credit | None = None) -> None:
-        """Put a model in the place of one that is damaged; raises StoreError where that was another. The `credit` counts where
-        the damaged one's is not known.
+        """Replace a damaged model; raises StoreError if the damaged one was a different model. `credit` is used if the damaged
+        model's credit is unknown.
         """
         wanted = _with_rest(spec, steps)
         if wanted:
@@ -97,7 +97,7 @@ class Models:
         return otherwise if known is None else known.credit
 
     def _check_key(self, spec: ModelSpec) -> None:
-        """Raises StoreError where the key is that of a time step of a model that the store holds."""
+        """Raise StoreError if the key belongs to a time step of a model in the store."""
         track, _, frame = spec.key.rpartition("-f")
         info = self.store.model_info(track) if track and frame.isdecimal() else None
         if info is not None and any(step.key == spec.key for step in info.steps):
@@ -107,8 +107,8 @@ class Models:
             )
 
     def made(self, spec: ModelSpec, steps: Iterable[TimeStep], credit: Credit | None) -> tuple[ModelInfo, Export]:
-        """The record of a model at these time steps, made from its source, and what writes its files. Raises ModelError for a
-        file that cannot be used.
+        """The record of a model at these time steps, made from its source, and the function that writes its files. Raises
+        ModelError for an unusable file.
         """
         return self._made(spec, _with_rest(spec, steps), credit)
 
@@ -124,7 +124,7 @@ class Models:
             self.store.write_model_info(folder, info)
 
     def _still(self, spec: ModelSpec) -> tuple[ModelInfo, Export]:
-        """A model that stays as it is."""
+        """The record and export of a model that does not deform."""
         mesh = self.stages.model(spec)
 
         def export(folder: Path) -> None:
@@ -134,7 +134,7 @@ class Models:
         return self._info(spec, mesh), export
 
     def _deforming(self, spec: ModelSpec, steps: Steps) -> tuple[ModelInfo, Export]:
-        """A model with all its time steps."""
+        """The record and export of a deforming model with all its time steps."""
         model = DeformingMesh.of({frame: self.stages.model(spec, step) for frame, step in steps.items()})
         infos = tuple(replace(self._info(spec, model.meshes[f], step), track=spec.key) for f, step in steps.items())
         rest = next(info for info in infos if info.step == steps[_rest(spec)])
@@ -173,7 +173,7 @@ class Models:
         )
 
     def _compare(self, spec: ModelSpec, known: ModelInfo, wanted: Steps) -> None:
-        """Raises StoreError where the model is not the one that the store holds, at the time steps that it holds of it."""
+        """Raise StoreError if the model differs from the stored one at the stored time steps."""
         held = _steps(known)
         if bool(held) != bool(wanted):
             raise _changed(self.store, spec)
@@ -200,7 +200,7 @@ class Models:
 
 
 def _short(value: object) -> str:
-    """A value in a message: what models say of themselves may be long."""
+    """A value for a message, shortened because models' metadata may be long."""
     return repr(value) if value is None or isinstance(value, (str, tuple)) else shorten(str(value), 100, placeholder=" ...")
 
 
@@ -212,14 +212,14 @@ def _changed(store: Store, spec: ModelSpec) -> StoreError:
 
 
 def _rest(spec: ModelSpec) -> int:
-    """The frame at which an animated model rests."""
+    """The frame of an animated model's rest pose."""
     frame = frame_of(spec, None)
     assert frame is not None
     return frame
 
 
 def _with_rest(spec: ModelSpec, steps: Iterable[TimeStep]) -> Steps:
-    """The time steps with that at which the model rests; none for a model that stays as it is."""
+    """The time steps, including the one of the rest pose; none for a model that does not deform."""
     found = {step.frame: step for step in steps}
     return dict(sorted(({_rest(spec): TimeStep(frame=_rest(spec))} | found).items())) if found else {}
 
@@ -234,7 +234,7 @@ def mesh_digest(mesh: Mesh) -> str:
     for name in (f.name for f in fields(Mesh) if f.name not in {"images", "warnings"}):
         value = getattr(mesh, name)
         if "body_part" in name and not mesh.body_parts:
-            continue  # digests of models without bones are as they were before there were parts of bodies
+            continue  # models without bones keep the digests from before body parts existed
         digest.update(name.encode())
         digest.update(value.tobytes() if hasattr(value, "tobytes") else repr(value).encode())
     for image in mesh.images:
@@ -245,8 +245,8 @@ def mesh_digest(mesh: Mesh) -> str:
 def check_models(planned: Plan, tell: Listener = null_listener) -> tuple[str, ...]:
     """Read each model of a plan, place it and its cameras; returns the warnings, `<key>: <warning>`.
 
-    Raises ModelError or RecipeError, a line each, for all files that cannot be used, and for all models and scenes without
-    room or with a camera inside.
+    Raises ModelError or RecipeError, with one line each for all unusable files, and for all models and scenes without room or
+    with a camera inside.
     """
     stages, specs = Stages(), planned.kept_specs
     distances = Distances(planned, stages.box)

@@ -1,4 +1,4 @@
-"""Compile every kernel a shot needs before workers come, which find them in the cache."""
+"""The compilation of a shot's kernels before workers start, which then find them in the cache."""
 
 from __future__ import annotations
 
@@ -50,14 +50,14 @@ BESIDE: Matrix4 = ((1.0, 0.0, 0.0, 0.1), *IDENTITY[1:])
 FLOOR: Matrix4 = ((1.0, 0.0, 0.0, 0.0), (0.0, 0.0, 1.0, 0.0), (0.0, -1.0, 0.0, -1.0), IDENTITY[3])
 ROOF: Matrix4 = ((1.0, 0.0, 0.0, 0.0), (0.0, 0.0, -1.0, 0.0), (0.0, 1.0, 0.0, 1.0), IDENTITY[3])
 MARKS = "marks"
-"""The folder of lists of kernels."""
+"""The folder for lists of kernels."""
 
 PACKAGE = Path(plugins.__file__).parent.parent
 
 
 def precompile(shot: Shot, tell: Told) -> None:
-    """Compile on all cores the kernels that a shot's frames call, unless they are compiled. `tell` is given their number, and
-    how many are done; kernels that the table lacks are compiled when they are called.
+    """Compile on all cores the kernels that a shot's frames call, unless they are compiled. `tell` receives the number of
+    compiled kernels and the total. Kernels that the table lacks are compiled when they are called.
     """
     if is_compiled(shot):
         return
@@ -71,8 +71,8 @@ def precompile(shot: Shot, tell: Told) -> None:
 
 
 def precompile_for(recipe: Recipe, tell: Told) -> None:
-    """`precompile` for the first shot of a recipe, whose models are not read for it; nothing for a recipe with errors, which
-    its reader reports.
+    """`precompile` for the first shot of a recipe, without reading models. Does nothing for a recipe with errors, which the
+    reader of the recipe reports.
     """
     mark = _list_of(recipe.digest[:16])
     if has_all() or entries.load(mark) is not None:
@@ -83,18 +83,18 @@ def precompile_for(recipe: Recipe, tell: Told) -> None:
 
 
 def sketched(recipe: Recipe) -> Shot:
-    """The first shot of a recipe as if all models were a metre large: it calls the same kernels, and no model is read."""
+    """The first shot of a recipe as if all models were one metre large. It calls the same kernels and needs no model files."""
     return next(iter(prepare(recipe).shots(lambda key, step=None: Box3d.between((-0.5,) * 3, (0.5,) * 3).corners)))
 
 
 def told_to(listener: Listener) -> Told:
-    """A listener to the compilation of kernels, as one to a run."""
+    """A function that passes the progress of compilation to a run's listener."""
     return lambda done, total: listener(Progress("kernels", done, total))
 
 
 def compile_table(tell: Told) -> int:
-    """Compile the whole table, as for a wheel, and note that nothing is left to compile; gives the number of kernels that could
-    not be compiled.
+    """Compile the whole table, as for a wheel, and note that nothing is left to compile; returns the number of kernels that
+    failed to compile.
     """
     left = len(table()) - len(compile_all(table(), tell))
     if not left:
@@ -114,16 +114,16 @@ def _compiled_before() -> set[str]:
 
 
 def _list_of(what: str) -> str:
-    """The entry for a list that holds for this state of viewsphere and this build."""
+    """The cache entry for a list that is valid for this state of viewsphere and this build."""
     return f"{MARKS}/{what}-{package_digest(PACKAGE)[:16]}{entries.SUFFIX}"
 
 
 def compile_kernels(shot: Shot) -> None:
-    """See to it that the kernels a shot needs are compiled.
+    """Compile the kernels that a shot needs, if they are not compiled.
 
-    The first time on a machine this takes some 20 CPU-seconds of one process; others wait for it. It leaves a mark beside the
-    kernels, the list of their entries. Later nothing is loaded, as long as these are there, and viewsphere, numba, Python, the
-    processor and what the shot uses, about as strongly, are the same.
+    The first time on a machine this takes one process about 20 CPU-seconds; other processes wait. It leaves a mark beside the
+    kernels: the list of their cache entries. Later calls load nothing, as long as these entries exist and viewsphere, numba,
+    Python, the processor and the shot's features (with values of similar magnitude) are the same.
     """
     if is_compiled(shot):
         return
@@ -138,7 +138,7 @@ def compile_kernels(shot: Shot) -> None:
 
 def _names() -> set[str]:
     """The entries of all kernels that this process has loaded or compiled."""
-    from numba.extending import is_jitted  # takes long to load; who renders has it
+    from numba.extending import is_jitted  # slow to load; a process that renders has it loaded
 
     modules = [vars(module) for module in list(sys.modules.values()) if isinstance(module, ModuleType)]
     kernels = (value for names in modules for value in list(names.values()) if is_jitted(value))
@@ -147,7 +147,7 @@ def _names() -> set[str]:
 
 @contextmanager
 def _alone(folder: Path) -> Generator[None]:
-    """No other process is in a block of this folder meanwhile, where the system has locks of folders."""
+    """Lock a folder against other processes for the duration of the block, if the system supports locks of folders."""
     descriptor = -1
     with suppress(ImportError, OSError):
         import fcntl
@@ -163,18 +163,18 @@ def _alone(folder: Path) -> Generator[None]:
 
 
 def is_compiled(shot: Shot) -> bool:
-    """True if the kernels that a shot needs are compiled; loads none. Wheels bring all."""
+    """True if the kernels that a shot needs are compiled; loads none. Wheels include all kernels."""
     return has_all() or _is_true(_mark(_small(shot)))
 
 
 def has_all() -> bool:
-    """True if all kernels are compiled for this state of viewsphere: wheels bring them, `compile_table` makes them."""
+    """True if all kernels are compiled for this state of viewsphere: they come with wheels or from `compile_table`."""
     return entries.load(_list_of("all")) is not None
 
 
 def load_kernels(shot: Shot) -> None:
-    """Render one tiny frame of two cards with the shot's engine, channels, scene and lens, and of two more for a place; the
-    picture is thrown away.
+    """Render one tiny frame of two cards (plus two for a place) with the shot's engine, channels, scene and lens; the picture
+    is discarded.
     """
     _render(_small(shot))
 
@@ -198,7 +198,7 @@ def _small(shot: Shot) -> Shot:
 
 
 def _sequence(shot: Shot, first: Instant, things: tuple[Thing, ...]) -> dict[str, Any]:
-    """Two instants, in between which one of the things moves, blurred where the shutter is open."""
+    """Two instants between which one of the things moves, with blur if the shutter is open."""
     there_and_back = Motion(poses=(IDENTITY, BESIDE))
     moved = things[0].model_copy(update={"motion": there_and_back})
     sweeps = (Sweep(moments=(-0.5, 0.5), motion=there_and_back), *[None] * (len(things) - 1))
@@ -209,7 +209,8 @@ def _sequence(shot: Shot, first: Instant, things: tuple[Thing, ...]) -> dict[str
 
 
 def _mark(small: Shot) -> str:
-    """The entry that is there when this shot's kernels are: named by what they are compiled from and by what it uses."""
+    """The cache entry that marks this shot's kernels as compiled; its name depends on their sources and on the shot's features.
+    """
     scene = _outline(small.model_dump(mode="json", exclude={"engine_options"}))
     used = json.dumps([scene, small.engine_options], sort_keys=True)
     engine = engine_digest(small.engine)
@@ -218,13 +219,13 @@ def _mark(small: Shot) -> str:
 
 
 def _is_true(mark: str) -> bool:
-    """True if the kernels that it lists exist."""
+    """True if the kernels in the mark's list exist."""
     listed = entries.load(mark)
     return listed is not None and all(map(entries.has, listed.decode().splitlines()))
 
 
 def _outline(value: JsonValue) -> JsonValue:
-    """The value with signs and powers of ten for its numbers: they say what is there at all."""
+    """The value with each number reduced to its sign and power of ten, which show the features in use."""
     if isinstance(value, dict):
         return {name: _outline(part) for name, part in value.items()}
     if isinstance(value, list):
@@ -235,7 +236,7 @@ def _outline(value: JsonValue) -> JsonValue:
 
 
 def features(shot: Shot) -> frozenset[str]:
-    """Features of a shot that decide which kernels its frames call: the paths of what is there, with values that are words, and
+    """Features of a shot that decide which kernels its frames call: the paths of its fields, with values that are words, and
     the engine's options.
     """
     small = _small(shot)
@@ -280,7 +281,7 @@ def _card() -> Mesh:
     uv = np.array([[0, 1], [1, 1], [1, 0], [0, 0]], np.float32)
     pixels = np.full((4, 4, 4), 255, np.uint8)
     pixels[1:3, 1:3, 3] = 0
-    # The floor of a place is one, whose mirror image is drawn where light bounces.
+    # The floor of a place is such a card; its mirror image is drawn where light bounces.
     mirror = Material(base_color_texture=Texture(0), alpha_mode="MASK", roughness=0.05)
     return Mesh(
         vertices=corners,

@@ -27,7 +27,7 @@ from viewsphere.truth.raster.visibility import rasterize
 from viewsphere.truth.shot_views import NeighbourViews, ShotViews, views_of
 
 MODELS = 200
-"""Exported models that are kept in memory."""
+"""Number of exported models that are kept in memory."""
 
 
 class ViewReconstructor:
@@ -42,10 +42,10 @@ class ViewReconstructor:
         self._views: tuple[object, ShotViews | None] = None, None
         self._last: tuple[object, LabelContext | None] | None = None
         self._continued = lru_cache(maxsize=4)(self._joined)
-        self._keys: dict[int, str] = {}  # of the objects of the views' shot: merged data sets have names of their own
+        self._keys: dict[int, str] = {}  # for the objects of the views' shot: merged data sets have their own names
 
     def is_possible(self, sample: Sample) -> bool:
-        """Return whether it is known what was seen: the shot is kept, and the objects are placed."""
+        """Return whether a sample's view can be reconstructed: its shot is stored, and its objects have poses."""
         known = self._scenery.shot(self._scenery.key_of(sample.index)) is not None
         return known and sample.known_camera is not None and all(o.source is None for o in sample.objects)
 
@@ -71,7 +71,7 @@ class ViewReconstructor:
         key = self._scenery.key_of(sample.index)
         made = self._continued(key) if continued else self._made(key)
         assert made is not None
-        options = {**made.shot.labels, **sample.options}  # those of channels added later, too
+        options = {**made.shot.labels, **sample.options}  # including those of channels added later
         around, shot = made.around, made.shot.model_copy(update={"labels": options})
         geometry = self._built(sample, shot, around)
         if geometry is None:
@@ -89,7 +89,8 @@ class ViewReconstructor:
         return shot and _Made(shot, self._scenery.around(key))
 
     def _joined(self, key: str) -> _Made | None:
-        """A shot of a sequence with the last instant of the one before, and the first of the one after, where it lacks them."""
+        """A shot of a sequence with the last instant of the previous shot and the first instant of the next, if it lacks them.
+        """
         made, row = self._made(key), self._dataset.plan.find(key)
         if made is None or row is None or not made.shot.sequence:
             return made
@@ -100,7 +101,7 @@ class ViewReconstructor:
         return made
 
     def _beside(self, frame: int, own: Row) -> _Made | None:
-        """The shot of a frame; raises StoreError where it is of the same sequence as another, and is not finished."""
+        """The shot of a frame; raises StoreError if it belongs to the same sequence as `own` but is not finished."""
         row = self._dataset.plan.row_at(frame)
         if self._dataset.store.has_shot(row.key):
             return self._made(row.key)
@@ -119,7 +120,7 @@ class ViewReconstructor:
         return Placement(_spec(info), pose, sample.camera, shot.category_deg, lambda: info, _step(info))
 
     def _built(self, sample: Sample, shot: Shot, around: SceneryRecord) -> Geometry | None:
-        """The geometry that a sample shows; None where scenery is not what it was."""
+        """The geometry that a sample shows; None if scenery has changed."""
         there = {o.id: o for o in sample.objects}
         objects = tuple(self._thing(there.get(thing.id), thing) for thing in shot.objects)
         instant, _ = self._scenery.taken(sample, shot)
@@ -140,17 +141,17 @@ class ViewReconstructor:
     def _compared(
         self, key: str, sample: Sample, shot: Shot, around: SceneryRecord, needs: tuple[Need[Any], ...]
     ) -> NeighbourViews | None:
-        """Return the views that labels of motion and stereo compare a sample with; None without any, and where scenery has
-        changed.
+        """Return the views that labels of motion and stereo compare a sample with; None without such views, or if scenery
+        has changed.
 
         Points are picked here, before any label requests triangles, which would overwrite them.
         """
         if not needs:
             return None
         keys = {o.id: o.track or o.key for o in sample.objects}
-        known = key, len(shot.instants)  # with neighbours or without; shots of merged data sets may share the key they had
+        known = key, len(shot.instants)  # with neighbours or without; shots of merged data sets may share their old key
         if self._views[0] != known:
-            self._keys = keys  # before the views are made, which ask for meshes
+            self._keys = keys  # before the views are made, which request meshes
             self._views = known, self._shot_views(shot, around)
         self._keys.update(keys)
         views, (instant, sensor) = self._views[1], self._scenery.taken(sample, shot)
@@ -159,7 +160,7 @@ class ViewReconstructor:
         return views and views.neighbours(instant, sensor)
 
     def _shot_views(self, shot: Shot, around: SceneryRecord) -> ShotViews | None:
-        """The views of a shot whose things stand where the shot says, in the exported models."""
+        """The views of a shot, with its exported models at the poses in the shot."""
         if any(self._scenery.mesh(around, thing.at(i)) is None for thing in around.things for i in range(len(shot.instants))):
             return None
 
@@ -171,7 +172,7 @@ class ViewReconstructor:
         return views_of(shot.model_copy(update={"things": (*shot.things, *around.things)}), mesh)
 
     def _thing(self, o: ObjectAnnotation | None, thing: Thing) -> Thing:
-        """An object as a sample says that it stands, or not there."""
+        """An object with its pose from a sample, or marked as absent."""
         if o is None:
             return Thing(id=thing.id, model=thing.model, motion=Motion(poses=(None,)))
         info = self._models[o.key]
@@ -180,26 +181,26 @@ class ViewReconstructor:
     def _read(self, key: str) -> Mesh:
         info = self._models[key]
         kept = (labels().get(name) for name in self._dataset.plan.channels)
-        whole = any(requires(label.needs, LidarScan) for label in kept if label)  # whose intensity follows from colours
+        whole = any(requires(label.needs, LidarScan) for label in kept if label)  # its intensity follows from colours
         return read_exported(self._dataset.path(info.glb), info.parts, info.node, whole=whole)
 
 
 @dataclass(frozen=True)
 class _Made:
-    """A shot as it was rendered, and what stands around its objects."""
+    """A shot as it was rendered, and the scenery around its objects."""
 
     shot: Shot
     around: SceneryRecord
 
     def with_instant(self, other: _Made, place: int) -> _Made:
-        """The same with an instant of a neighbour in its sequence, the first one that is recorded (0), or the last (-1); as it
-        is where it has that already.
+        """A copy with the first recorded instant (0) or the last (-1) of a neighbour in its sequence; unchanged if it has that
+        instant already.
         """
         at = [i for i, instant in enumerate(other.shot.instants) if instant.recorded][place]
         instant, own = other.shot.instants[at], self.shot.instants
         if any(one.index == instant.index for one in own):
             return self
-        where = sum(one.index < instant.index for one in own)  # points that are followed bring instants far away, too
+        where = sum(one.index < instant.index for one in own)  # followed points also add distant instants
 
         def inserted(values: Iterable[Any], one: Any) -> tuple[Any, ...]:
             known = tuple(values)
@@ -224,7 +225,7 @@ class _Made:
 
 
 def _spec(info: ModelInfo) -> ModelSpec:
-    """The model as labels know it: what the data set says of it."""
+    """The model's spec for labels, from the data set's metadata."""
     return ModelSpec(
         key=info.track or info.key,
         source="",

@@ -1,4 +1,4 @@
-"""Recipes of a data set's parts, planned again from what the data set says of them."""
+"""The recipes of a data set's parts, planned again from the data set's records."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ from viewsphere.recipe.recipe import Recipe
 from viewsphere.store import PlanRecord, Simulated, Store
 
 MOST_FOLDERS = 8
-"""Folders above a model's file in which its recipe is looked for."""
+"""Number of folders above a model's file that are searched for its recipe."""
 
 MOST_SHOTS = 100
-"""Shots of a part that are asked where its models' files lay."""
+"""Number of a part's shots that are searched for the places of its models' files."""
 
 
 class AnotherPlan(StoreError):
-    """A part's recipe gives another plan than the part's; `planned` is the plan."""
+    """A part's recipe gives a plan that differs from the part's plan; `planned` is the recipe's plan."""
 
     def __init__(self, message: str, planned: Plan) -> None:
         super().__init__(message)
@@ -42,8 +42,8 @@ class Replanned:
     def plan(self, number: int) -> Plan:
         """The plan of a part's recipe.
 
-        Raises StoreError for a part that another data set brought, and where files of the recipe are no longer where they were;
-        AnotherPlan where they are, and the plan is another.
+        Raises StoreError for a part merged from another data set, and if files of the recipe are missing. Raises AnotherPlan if
+        the files exist but the plan differs.
         """
         if number not in self._plans:
             try:
@@ -56,8 +56,7 @@ class Replanned:
         return found
 
     def portion(self, number: int) -> DatasetPart:
-        """A part, with its recipe's plan, which reads what was simulated for the part and keeps nothing more; errors as for
-        `plan`.
+        """A part with its recipe's plan. It reads the part's stored simulations and stores no new ones; errors as for `plan`.
         """
         if number not in self._portions:
             found = resumed(self.plan(number), self.record, number)
@@ -70,7 +69,7 @@ class Replanned:
         return {spec.key: spec for spec, _ in self.portion(number).models}
 
     def steps_of(self, key: str) -> tuple[TimeStep, ...]:
-        """The time steps of a model that all parts ask for whose recipes can be planned."""
+        """The time steps of a model that are needed by all parts whose recipes can be planned."""
         found: dict[int, TimeStep] = {}
         for number in range(len(self.record.parts)):
             with suppress(UserError):
@@ -99,7 +98,7 @@ class Replanned:
         raise problem or StoreError(f"{self.store.root}: expected a folder to plan in, found none")
 
     def _folders(self, number: int) -> Iterator[Path]:
-        """Folders in which the recipe's file may have been: here, or above a model's."""
+        """Possible folders of the recipe's file: the current folder, and folders above a model's file."""
         yield Path.cwd()
         for row, _ in zip(self.record.rows_of(number), range(MOST_SHOTS), strict=False):
             try:

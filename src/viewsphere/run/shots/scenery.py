@@ -1,4 +1,4 @@
-"""The scenery behind the objects of a data set's shots: the data set does not store it, so it is made again."""
+"""The scenery behind the objects of a data set's shots, which is remade because the data set does not store it."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ NONE = SceneryRecord(things=(), digests={})
 
 @dataclass(eq=False)
 class Scenery:
-    """Gives shots as they were rendered and the meshes of their scenery. `notes` says what is not what it was."""
+    """Provides shots as they were rendered and the meshes of their scenery. `notes` lists the changes since then."""
 
     dataset: Dataset
     notes: list[str] = field(default_factory=list[str])
@@ -33,7 +33,7 @@ class Scenery:
         self.around = lru_cache(maxsize=4)(self._around)
 
     def key_of(self, frame: int) -> str:
-        """Key of the shot that a frame is of."""
+        """Key of the shot that contains a frame."""
         return self.dataset.plan.row_at(frame).key
 
     def taken(self, sample: Sample, shot: Shot) -> tuple[int, int]:
@@ -50,8 +50,8 @@ class Scenery:
         return SceneryRecord.model_validate_json(text) if text else NONE
 
     def mesh(self, record: SceneryRecord, thing: Thing) -> Mesh | None:
-        """The model of a shot's scenery as it is shown, None where it is not what it was. Merged data sets have several of one
-        key.
+        """The mesh of a shot's scenery at the time step shown; None if it has changed. Merged data sets may have several
+        meshes of one key.
         """
         digest = record.digests[thing.key]
         if digest not in self._known:
@@ -67,7 +67,7 @@ class Scenery:
         return self._known[digest]
 
     def known(self, record: SceneryRecord, thing: Thing) -> Mesh:
-        """The same of scenery that is what it was."""
+        """The mesh of scenery that is known to be unchanged."""
         mesh = self.mesh(record, thing)
         assert mesh is not None
         return mesh

@@ -1,4 +1,4 @@
-"""From a shot to its samples: load the models, keep the stage warm, render frame by frame."""
+"""The rendering of a shot's samples: load the models, keep the stage warm, render frame by frame."""
 
 from __future__ import annotations
 
@@ -33,11 +33,11 @@ from viewsphere.truth.raster.visibility import with_ground
 from viewsphere.truth.shot_views import ShotViews
 
 if TYPE_CHECKING:
-    from viewsphere.engines import Stage  # which takes a third of a worker's start
+    from viewsphere.engines import Stage  # takes a third of a worker's start
     from viewsphere.planning.plan import Plan
 
 WARM_BYTES = 400_000_000
-"""Of models that are kept, the last ones used."""
+"""Maximum size of the cache of recently used models, bytes."""
 
 
 def model_files(key: str, frame: int | None = None) -> tuple[str, str]:
@@ -47,7 +47,7 @@ def model_files(key: str, frame: int | None = None) -> tuple[str, str]:
 
 @dataclass(frozen=True, eq=False)
 class StoredBoxes:
-    """The boxes (8, 3) of a data set's finished models; raises ModelError for another."""
+    """The boxes (8, 3) of a data set's finished models; raises ModelError for any other model."""
 
     store: Store
     _known: dict[str, ModelInfo] = field(default_factory=dict[str, ModelInfo])
@@ -67,7 +67,7 @@ class StoredBoxes:
 
 @dataclass(eq=False)
 class Stages:
-    """Renders shots; keeps the last shot's stage, and the models used last, warm."""
+    """Renders shots; caches the last shot's stage and the recently used models."""
 
     _stage: Stage | None = None
     _stage_key: tuple[str, tuple[Stamp, ...]] = ("", ())
@@ -78,11 +78,11 @@ class Stages:
     _traits: dict[str, ModelMetadata] = field(default_factory=dict[str, ModelMetadata])
 
     def model(self, spec: ModelSpec, step: TimeStep | None = None) -> Mesh:
-        """The normalised model at a time step (None: as it rests); raises ModelError if its file cannot be used."""
+        """The normalised model at a time step (None: its rest pose); raises ModelError if its file cannot be used."""
         name = _name(spec, step)
         known = self._models.pop(name, None)
         mesh = known or self._loaded(spec, step)
-        self._models[name] = mesh  # the last used comes last
+        self._models[name] = mesh  # the most recently used comes last
         if known:
             return known
         if name not in self._boxes:
@@ -93,7 +93,7 @@ class Stages:
         return mesh
 
     def _loaded(self, spec: ModelSpec, step: TimeStep | None) -> Mesh:
-        """Many may be parts of one model, which is loaded once."""
+        """The loaded model; a file with many parts is loaded once for all of them."""
         if spec.parts is None:
             mesh, self._facts[_name(spec, step)] = load(spec, step=step)
             return with_body_parts(mesh, spec)
@@ -119,7 +119,7 @@ class Stages:
         return self._traits[name]
 
     def real_size(self, spec: ModelSpec, step: TimeStep | None = None) -> Size | None:
-        """The model's true (width, height, length) in metres, None if nobody said."""
+        """The model's true (width, height, length) in metres; None if unknown."""
         if spec.real_size != "file":
             return spec.real_size
         name = _name(spec, step)
@@ -128,14 +128,14 @@ class Stages:
         return self._sizes[name]
 
     def read_ahead(self, planned: Plan, specs: Sequence[ModelSpec]) -> None:
-        """Read all time steps of each model of the plan at once, where it moves, instead of one after another."""
+        """Read all time steps of each animated model of the plan at once, instead of one after another."""
         for spec in specs:
             frames = {step.frame for step in planned.steps_of(spec)}
             if frames and spec.rest is not None:
                 read_ahead(spec, frames | {spec.rest})
 
     def stage(self, shot: Shot) -> Stage:
-        """The engine's stage for this shot, built anew only when the scene is another one, or a picture in it has changed."""
+        """The engine's stage for this shot, rebuilt only if the scene is a different one or a picture in it has changed."""
         key = shot.stage_key, _stamps(shot)
         if self._stage is None or self._stage_key != key:
             stage: Stage = plugins.load(EngineSpec, shot.engine).staged(shot, self.model)
@@ -163,18 +163,18 @@ class Stages:
 
 
 def _name(spec: ModelSpec, step: TimeStep | None) -> str:
-    """Equal for equal models."""
+    """A name that is equal for equal models."""
     return spec.model_dump_json() + (step.model_dump_json() if step else "")
 
 
 def _stamps(shot: Shot) -> tuple[Stamp, ...]:
-    """Of the files that the surfaces of a shot show."""
+    """The stamps of the files on the surfaces of a shot."""
     ground = () if shot.scene.ground is None else ground_stamps(shot.scene.ground)
     return ground + repaint_stamps(repaint for thing in shot.things for repaint in thing.repaints)
 
 
 def _size(mesh: Mesh) -> int:
-    """Bytes, about."""
+    """The approximate size in bytes."""
     per_vertex = sum(a.nbytes for a in (mesh.vertices, mesh.normals, mesh.uv0, mesh.uv1, mesh.colors) if a is not None)
     return per_vertex + 5 * mesh.triangles.nbytes // 3 + sum(i.pixels.nbytes for i in mesh.images)
 
@@ -187,11 +187,11 @@ def render_sample(
     sizes: Sequence[Size | None],
     metadata: Sequence[Callable[[], ModelMetadata]],
 ) -> Sample:
-    """One of the samples of the views' shot: colour from the engine, every label from truth, for which a shadow catcher may not
-    be there.
+    """One of the samples of the views' shot, with colour from the engine and every label from exact geometry. A shadow catcher
+    may be absent in the labels.
 
-    `boxes`, `sizes` and `metadata`: each object's 3D box then in its own axes, its real size if known, and what gives what its
-    model says of itself.
+    `boxes`, `sizes` and `metadata` are, for each object, its 3D box at that instant in its own axes, its real size if known,
+    and a function that returns its model's metadata.
     """
     shot, (number, instant, sensor) = views.shot, sample
     kept = shot.kept(sensor)
@@ -230,9 +230,9 @@ def render_sample(
 
 
 def _arrange(views: ShotViews, instant: int, sensor: int, names: Sequence[str]) -> None:
-    """Ask for the triangles of all instants that labels compare, in their order, which reuses those of the sample before.
+    """Request the triangles of all instants that labels compare, in order, which reuses those of the previous sample.
 
-    Before that the points that the sensor follows are picked: at so many instants that these triangles would be written over.
+    The points that the sensor follows are picked first, because that visits many instants and would overwrite these triangles.
     """
     known = [labels()[name] for name in names]
     if any(requires(label.needs, FollowedPoints) for label in known):

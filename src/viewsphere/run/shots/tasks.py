@@ -1,4 +1,4 @@
-"""The two kinds of work a data set is made of: a model to normalise and export, a shot to render."""
+"""The two main tasks of a run: to normalise and export a model, and to render a shot."""
 
 from __future__ import annotations
 
@@ -28,8 +28,8 @@ Kind = Literal["model", "same model", "damaged model"]
 
 @dataclass(frozen=True)
 class ModelTask:
-    """A model, with its time steps if it deforms, and its credit; the "same model" has to be what the store holds, if it is
-    there. What is made of a "damaged model" takes its place.
+    """A model, with its time steps if it deforms, and its credit. A "same model" has to match the store's, if that exists; a
+    remade "damaged model" replaces the stored one.
     """
 
     kind: Kind
@@ -40,14 +40,14 @@ class ModelTask:
 
 @dataclass(frozen=True)
 class Damaged:
-    """A shot that is there, and is to be made again."""
+    """An existing shot that has to be remade."""
 
     row: Row
 
 
 @dataclass(frozen=True)
 class KernelTask:
-    """The kernels that a shot needs, to be compiled before others ask for them."""
+    """The kernels of a shot, to be compiled before other tasks need them."""
 
     shot: Shot
 
@@ -64,8 +64,8 @@ class Worker:
         self.composer = Composer(self._portion, self._boxes, self.stages)
 
     def do(self, task: ModelTask | KernelTask | Row | Damaged, tell: Callable[[int], None]) -> int:
-        """Make models, kernels, or the shot of a row; gives the number of frames that were made. `tell` is given their number
-        so far after each of them.
+        """Make models, kernels, or the shot of a row; returns the number of frames made. `tell` receives the number
+        so far after each frame.
         """
         if isinstance(task, Row):
             return self.make_shot(task, tell)
@@ -81,13 +81,13 @@ class Worker:
         return 0
 
     def compile_for(self, row: Row) -> None:
-        """See to it that this machine has the kernels that the shot of a row needs."""
+        """Compile the kernels that the shot of a row needs, if this machine lacks them."""
         with self._portion.plan.recipe.located():
             compile_kernels(self._portion.shot(row, self._boxes))
 
     def make_shot(self, row: Row, tell: Callable[[int], None], again: bool = False) -> int:
-        """Make the shot of a row and render it into the store; gives the number of its frames, and `tell` so far after each.
-        Errors of one that takes the place of a damaged one (`again`) as for `Store.scratch_folder`.
+        """Make the shot of a row and render it into the store; returns the number of its frames; `tell` receives the number
+        so far after each. With `again`, it replaces a damaged shot and raises errors as `Store.scratch_folder`.
         """
         shot = self.composer.shot(row)
         with importing():
@@ -98,7 +98,7 @@ class Worker:
 
 
 def _counted(samples: Iterable[Sample], tell: Callable[[int], None]) -> Iterator[Sample]:
-    """The samples; their number so far is told when the next one is asked for, when the last one is written."""
+    """The samples. `tell` receives their number so far at the request for the next one, when the previous one is written."""
     for number, sample in enumerate(samples, 1):
         yield sample
         tell(number)

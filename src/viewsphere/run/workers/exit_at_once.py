@@ -1,4 +1,4 @@
-"""The end of a process without the third of a second in which Python and LLVM take apart what they hold."""
+"""The end of a process without the third of a second in which Python and LLVM free their objects."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import threading
 from typing import NoReturn
 
 UNWRITTEN = 2
-"""Exit status where standard output does not take its last bytes, as on a full disk."""
+"""Exit status if standard output does not accept its last bytes, as on a full disk."""
 
 
 def exit_at_once(status: int) -> NoReturn:
@@ -19,7 +19,7 @@ def exit_at_once(status: int) -> NoReturn:
     threading._shutdown()  # pyright: ignore # Python's own end calls the same two functions first
     atexit._run_exitfuncs()  # pyright: ignore
     for stream in (sys.stdout, sys.stderr):
-        if stream is not None and not stream.closed:  # it had none to begin with, or was closed when all was written
+        if stream is not None and not stream.closed:  # there was no stream, or it was closed after writing
             try:
                 stream.flush()
             except (OSError, ValueError):  # full

@@ -1,4 +1,4 @@
-"""Work whose pieces processes of this machine do at once, and whose results are wanted in order."""
+"""Parallel work in processes of this machine, with results in order."""
 
 from __future__ import annotations
 
@@ -18,17 +18,17 @@ Task = TypeVar("Task")
 Made = TypeVar("Made")
 
 AHEAD = 4
-"""Results a worker that wait for an earlier one, at most, so that memory does not grow where one is slow."""
+"""Maximum number of results per worker that wait for an earlier result, so that memory does not grow if one task is slow."""
 
 ADVICE = ": give it more memory, or ask for fewer workers"
 
 
 def in_order(workers: int, make: Callable[[], Callable[[Task], Made]], tasks: Iterable[Task]) -> Generator[tuple[Task, Made]]:
-    """Each task and what is made of it, in the order of the tasks, which are asked for when there is a worker for them.
+    """Each task with its result, in the order of the tasks, which are requested when a worker is free.
 
-    `make()`, called in each of so many worker processes, gives the function that does a task; all of it travels by pickle.
-    Raises the first UserError or OSError that a task raises, ViewsphereError with the traceback of anything else, and
-    WorkerDied where a worker dies: no task is done twice. Workers end with the iterator.
+    `make()`, called in each worker process, returns the function that does a task; everything is sent by pickle.
+    Raises the first UserError or OSError that a task raises, ViewsphereError with the traceback of any other exception, and
+    WorkerDied if a worker dies, because no task is done twice. Workers end with the iterator.
     """
     left, started, free = iter(tasks), list[WorkerProcess](), list[WorkerProcess]()
     busy, made = dict[Connection, tuple[int, Task, WorkerProcess]](), dict[int, tuple[Task, Made]]()
@@ -46,7 +46,7 @@ def in_order(workers: int, make: Callable[[], Callable[[Task], Made]], tasks: It
                 yield made.pop(taken)
                 taken += 1
             for pipe in wait(list(busy)) if busy else ():
-                number, task, worker = busy.pop(cast(Connection, pipe))  # Windows has another class
+                number, task, worker = busy.pop(cast(Connection, pipe))  # another class on Windows
                 made[number] = task, _answered(worker)
                 free.append(worker)
     finally:
@@ -55,7 +55,7 @@ def in_order(workers: int, make: Callable[[], Callable[[Task], Made]], tasks: It
 
 
 def _start(make: Callable[[], Any], started: list[WorkerProcess]) -> WorkerProcess:
-    with interrupts_deferred():  # until it is known here, so that it is ended with the others
+    with interrupts_deferred():  # until it is registered here, so that it is ended with the others
         started.append(WorkerProcess(_serve, make))
     return started[-1]
 
@@ -63,7 +63,7 @@ def _start(make: Callable[[], Any], started: list[WorkerProcess]) -> WorkerProce
 def _answered(worker: WorkerProcess) -> Any:
     try:
         made, error = worker.pipe.recv()
-    except (EOFError, OSError):  # it may die in the middle of an answer
+    except (EOFError, OSError):  # it may die while sending an answer
         raise WorkerDied(f"expected a worker's answer, found that it died: {end_reason(worker.end(), ADVICE)}") from None
     if error is not None:
         raise error
@@ -71,7 +71,7 @@ def _answered(worker: WorkerProcess) -> Any:
 
 
 def _serve(pipe: Connection, make: Callable[[], Callable[[Any], Any]]) -> None:
-    """A worker's life: take a task, answer, until the other side is gone."""
+    """The loop of a worker: receive a task, send the answer; ends when the parent is gone."""
     belong_to_parent()
     from viewsphere.run.workers.allocator import keep_freed_memory
 

@@ -1,4 +1,4 @@
-"""Worker processes of this machine, as the one that starts them sees them: one pipe a worker, spawn rather than fork."""
+"""Worker processes of this machine, for the process that starts them: one pipe per worker, spawned rather than forked."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ from typing import Any
 from viewsphere.run.workers.exit_at_once import exit_at_once
 
 OUT_OF_MEMORY = 77
-"""Exit code of a worker that was refused memory."""
+"""Exit code of a worker that ran out of memory."""
 
 DYING_S = 10.0
-"""Seconds that a worker whose pipe is closed has to end by itself, so that its exit code is its own."""
+"""Seconds for a worker with a closed pipe to end by itself, so that its exit code is its own."""
 
 
 class WorkerProcess:
-    """A worker process that does `serve(pipe, *told)`, to be stopped by who started it."""
+    """A worker process that runs `serve(pipe, *told)`; the process that started it has to stop it."""
 
     def __init__(self, serve: Callable[..., None], *told: Any) -> None:
         context = get_context("spawn")
@@ -34,25 +34,25 @@ class WorkerProcess:
         theirs.close()
 
     def send(self, what: object) -> None:
-        """Send it something; that it is dead is noticed when its answer is awaited."""
+        """Send an object to the worker; a dead worker is noticed when its answer is awaited."""
         with suppress(OSError):
             self.pipe.send(what)
 
     def stop(self) -> int | None:
-        """End the process, and give its exit code; what it had not finished is lost, what it had is not."""
-        self.process.kill()  # which ends one that is stopped, too
+        """End the process and return its exit code; only unfinished work is lost."""
+        self.process.kill()  # also ends a stopped process
         self.process.join()
         self.pipe.close()
         return self.process.exitcode
 
     def end(self) -> int | None:
-        """The exit code of one whose pipe is closed."""
+        """The exit code of a worker whose pipe is closed."""
         self.process.join(DYING_S)
         return self.stop()
 
 
 def _live(serve: Callable[..., None], *told: Any) -> None:
-    """The whole of a worker process, which ends at once."""
+    """The main function of a worker process, which ends at once."""
     serve(*told)
     exit_at_once(0)
 
@@ -68,8 +68,8 @@ def end_reason(code: int | None, advice: str) -> str:
 
 @contextmanager
 def interrupts_deferred() -> Generator[None]:
-    """A process started meanwhile ignores Ctrl-C, even before it serves; this process receives it afterwards."""
-    if sys.platform == "win32":  # has no masks to inherit
+    """Processes started in this context ignore Ctrl-C from their start; this process receives it after the block."""
+    if sys.platform == "win32":  # no masks to inherit
         yield
         return
     resource_tracker.ensure_running()  # the start of the tracker would unblock the signal again
@@ -92,7 +92,7 @@ def _later() -> Generator[None]:
     def note(do: Callable[..., Any], number: int, frame: FrameType | None) -> None:
         heard.append(partial(do, number, frame))
 
-    if current_thread() is main_thread():  # handlers are its alone, and run in it
+    if current_thread() is main_thread():  # only the main thread can set handlers, and they run in it
         for number, do in does.items():
             if callable(do):
                 signal.signal(number, partial(note, do))
@@ -114,7 +114,7 @@ def belong_to_parent() -> None:
 
 
 def _end_with_parent() -> None:
-    """End this process, whatever it does, as soon as its parent is dead: another run may be at its work already."""
+    """End this process as soon as its parent is dead, because another run may have taken over its work."""
     if parent := parent_process():
         wait([parent.sentinel])
         os._exit(1)

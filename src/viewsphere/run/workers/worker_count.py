@@ -27,17 +27,17 @@ FRAME_S, FRAME_S_PER_MEGAPIXEL = 0.02, 0.15
 
 
 def cores() -> int:
-    """The number of processes that may run at once."""
+    """The number of cores that this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def default_workers(work: Missing) -> int:
-    """One worker a core; none, so that this process renders, where one shot or less than SHORT_S of work is left."""
+    """One worker per core; 0, so that this process renders, if one shot or less than SHORT_S of work is left."""
     return 0 if is_short(work) else cores()
 
 
 def is_short(work: Missing) -> bool:
-    """True if one shot is left, or less than SHORT_S of work. The models to be made count for both."""
+    """True if one shot or less than SHORT_S of work is left, counting the models to be made."""
     shots = sum(count for _, count in work.lines())
     seconds, models = _frame_seconds(work, shots), 0
     for cost in _model_seconds(work):
@@ -48,7 +48,7 @@ def is_short(work: Missing) -> bool:
 
 
 def _frame_seconds(work: Missing, shots: int) -> float:
-    """Seconds for the frames that are left; infinite where a scene may cost any amount, as a place or a simulation does."""
+    """Seconds for the remaining frames; infinite if the cost of a scene is unbounded, as for a place or a simulation."""
     if shots > 1 and not _is_plain(work.portion.plan.recipe):
         return float("inf")
     sensors = [sensor.intrinsics for sensor in work.portion.plan.rig.sensors]
@@ -57,13 +57,13 @@ def _frame_seconds(work: Missing, shots: int) -> float:
 
 
 def _is_plain(recipe: Recipe) -> bool:
-    """True if models stand alone and our own engine paints them."""
+    """True if models appear alone and the raster engine paints them."""
     return recipe.engine.name == "raster" and recipe.scenes is None and not recipe.scene.is_composed
 
 
 def _model_seconds(work: Missing) -> Iterator[float]:
-    """Seconds for each model that is to be made, or compared with the one that the store holds."""
-    from viewsphere.plugins.source import is_versioned  # which loads pydantic
+    """Seconds for each model to be made, or to be compared with the stored one."""
+    from viewsphere.plugins.source import is_versioned  # loads pydantic
 
     store = work.store
     for spec, steps in work.portion.models:
@@ -73,7 +73,7 @@ def _model_seconds(work: Missing) -> Iterator[float]:
 
 
 def _megabytes(spec: ModelSpec) -> float:
-    """Size of a model's file; 0 for one that is no file of this machine."""
+    """Size of a model's file in megabytes; 0 if it is not a file on this machine."""
     with suppress(OSError):
         return Path(spec.source).stat().st_size / 1e6
     return 0.0

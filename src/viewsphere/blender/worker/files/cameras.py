@@ -62,7 +62,7 @@ def _object(scene, name):
 
 
 def _rigid(shown):
-    """The world-from-object matrix without its scale: a rigid motion."""
+    """The world-from-object matrix without its scale, which makes it rigid."""
     place, turn, _ = shown.matrix_world.decompose()
     return Matrix.LocRotScale(place, turn, None)
 

@@ -17,7 +17,7 @@ STRANDS = "particle hair"
 NAMES_SAID = 5
 
 OWN_SLASH = "\u2215"
-"""Stands for a slash in an object's name."""
+"""Replaces a slash in an object's name."""
 
 
 class Gathering:
@@ -218,7 +218,7 @@ def _colors(mesh, material, corners, loops):
 
 
 def _asked(told):
-    """Names of the colour attributes in a material's colour."""
+    """Names of the colour attributes that a material's colour uses."""
     if isinstance(told, dict):
         own = {told["name"]} if told.get("do") == "attribute" else set()
         return own.union(*(_asked(value) for value in told.values()))

@@ -1,7 +1,7 @@
 """Node trees of materials as plain expressions, which `viewsphere.assets.readers.blender.nodes` works out.
 
 An expression is a number, a list of three or four (linear colours), or a dict `{"do": name, ...}` of other expressions. Parts
-of a tree that no expression can say are listed by name in `lost`.
+of a tree that expressions cannot represent are listed by name in `lost`.
 """
 
 from __future__ import annotations
@@ -9,7 +9,7 @@ from __future__ import annotations
 from contextlib import contextmanager
 
 STEPS = 256
-"""Steps of the tables that stand for curves and colour ramps."""
+"""Steps of the tables that approximate curves and colour ramps."""
 
 MOST = 1000
 """Most nodes followed in one material, a node counted each time that it is used."""

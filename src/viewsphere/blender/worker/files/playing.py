@@ -106,7 +106,7 @@ def is_simulated(scene):
 
 
 def _moves(scene):
-    """Return whether there is anything that could change with time."""
+    """Return whether anything in the scene could change with time."""
     return bool(
         len(bpy.data.actions)
         or len(bpy.data.cache_files)

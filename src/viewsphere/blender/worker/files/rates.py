@@ -25,8 +25,8 @@ LEAST, MOST = 1.0, 1000.0
 
 
 def own_rate(file, kind):
-    """Frames a second of a USD or Alembic file; None of other kinds, and where the file does not say. An FBX file's are set by
-    Blender's reader.
+    """Frames a second of a USD or Alembic file; None for other kinds, and if the file has no rate. Blender's reader
+    sets the rate of an FBX file.
     """
     if kind in ("usd", "usda", "usdc", "usdz"):
         return _usd_rate(file)
@@ -34,7 +34,7 @@ def own_rate(file, kind):
 
 
 def set_rate(scene, rate):
-    """Let a second of the scene have so many frames."""
+    """Set the scene's number of frames a second."""
     scene.render.fps = max(round(rate), 1)
     scene.render.fps_base = scene.render.fps / rate
 

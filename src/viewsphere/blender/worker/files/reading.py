@@ -18,14 +18,14 @@ from .scene_file import reveal
 from .weight import check_weight
 
 PREFIX = "keypoint:"
-"""Begins the name of an object that is a point; the rest is the point's name."""
+"""Prefix of the name of an object that marks a point; the rest is the point's name."""
 
 POINT_PROPERTY = "keypoint"
-"""The custom property that makes an object a point: its name, or true for that of the object."""
+"""The custom property that makes an object a point: the point's name, or true to use the object's name."""
 
 
 PROPERTY = "viewsphere"
-"""The custom property that says what an object is; `width` and `closed` beside it are a lane's."""
+"""The custom property with an object's annotation; `width` and `closed` beside it describe a lane."""
 
 LANE = "lane"
 LINES = ("CURVE", "MESH")
@@ -72,7 +72,7 @@ def read(told):
 
 
 def _choices(told):
-    """A warning where a file has several animations and nobody chose one."""
+    """A warning if a file has several animations and none was chosen."""
     names = clips()
     if told["kind"] == "blend" or told.get("frame") is None or told.get("clip") is not None or len(names) < 2:
         return []
@@ -80,7 +80,7 @@ def _choices(told):
 
 
 def evaluate(scene, *takers):
-    """Give the scene as it is rendered to `takers`, whose `take` is called with the depsgraph."""
+    """Pass the rendered scene to `takers`: the `take` of each is called with the depsgraph."""
     failed = []
 
     class Taker(bpy.types.RenderEngine):
@@ -132,7 +132,7 @@ class Marks:
         self.found, self._wanted = [], wanted
 
     def take(self, depsgraph):
-        """Collect all such objects of a depsgraph that are asked for."""
+        """Collect all such requested objects of a depsgraph."""
         there = sorted(depsgraph.objects, key=lambda one: one.name)
         below = {}
         for one in there:
@@ -195,7 +195,7 @@ class Points:
         return self._wanted is None or one.original.as_pointer() in self._wanted
 
     def _rigs(self, there):
-        """Armatures that bend objects which are asked for."""
+        """Armatures that bend requested objects."""
         bent = [one for one in there if self._is_wanted(one) and one.type != "ARMATURE"]
         used = {m.object.name for one in bent for m in one.modifiers if m.type == "ARMATURE" and m.object is not None}
         return [one for one in there if one.type == "ARMATURE" and one.name in used]
@@ -211,7 +211,7 @@ class Points:
 
 
 def _said(one):
-    """The point that an object is said to be; empty for any other."""
+    """The name of the point that an object marks; empty for any other object."""
     said = one.get(POINT_PROPERTY)
     if said and not isinstance(said, str):
         return one.name.removeprefix(PREFIX)

@@ -43,7 +43,7 @@ def reveal(scene, names):
 
 
 def _fix(one, name, value):
-    """Set a property for good, against drivers and animations of the file: by a driver, which overrides animations.
+    """Set a property permanently, despite the file's drivers and animations, by a driver, which overrides animations.
 
     Objects from a library cannot be given drivers, but their animation curves can be muted.
     """

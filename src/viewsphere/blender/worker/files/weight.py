@@ -4,7 +4,7 @@ from __future__ import annotations
 
 
 def check_weight(scene, wanted, most):
-    """Raise ValueError when the objects that will be evaluated come to more than `most` triangles."""
+    """Raise ValueError if the objects to evaluate have more than `most` triangles in total."""
     total = 0
     for item in scene.objects:
         if item.hide_render or item.type != "MESH" or (wanted is not None and item.as_pointer() not in wanted):

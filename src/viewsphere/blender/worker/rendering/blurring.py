@@ -11,7 +11,7 @@ from ..files.playing import curves
 from .posing import camera_matrix
 
 STEPS = 3
-"""Cycles looks at 2 ** STEPS + 1 moments."""
+"""Cycles evaluates 2 ** STEPS + 1 moments."""
 
 ORDER = "viewsphere order"
 """Custom property of a placed object: its place among all."""
@@ -55,7 +55,7 @@ def _switch(scene, on):
 
 
 def _move(one, matrices, frame):
-    """Keys from half a frame before to half a frame after; straight and even between two of them."""
+    """Set keys from half a frame before to half a frame after, with linear interpolation."""
     one.rotation_mode = "QUATERNION"
     one.cycles.motion_steps = STEPS
     before = None

@@ -1,4 +1,4 @@
-"""The compositor of a file, which acts on the colours alone."""
+"""The compositor of a file, which affects only the colours."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ HOW = "pictures are those that the renderer gives; link Render Layers to its out
 
 
 def fault(scene):
-    """A warning where the compositor gives no picture, so that the uncomposited one is used; else none."""
+    """The warnings if the compositor produces no picture, so that the uncomposited one is used; else an empty list."""
     tree = tree_of(scene)
     if tree is None or not len(tree.nodes) or is_used(scene):
         return []
@@ -28,13 +28,13 @@ def fault(scene):
 
 
 def is_used(scene):
-    """Return whether a compositor gives the picture: Blender renders nothing for one that asks for no render layers."""
+    """Return whether a compositor produces the picture; Blender renders nothing for a compositor without render layers."""
     tree = tree_of(scene)
     return tree is not None and _has_output(tree) and _asks_for_layers(tree)
 
 
 def leave_out(scene):
-    """Take the compositor from a scene."""
+    """Remove the compositor from a scene."""
     if hasattr(scene, "compositing_node_group"):  # Blender 5.0 and later
         scene.compositing_node_group = None
     else:

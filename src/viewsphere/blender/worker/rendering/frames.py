@@ -33,7 +33,7 @@ shifts its sample pattern until one sample lies in the middle.
 """
 
 OTHERS_HIGHER = 0.1
-"""Pixels by which all samples but one lie higher in Blender 4.5, as measured with square pixels; with others hardly any."""
+"""Pixels by which all samples but one are higher in Blender 4.5, measured with square pixels; hardly any with other pixels."""
 
 PASSES = {"index": ("use_pass_object_index", ("Object Index", "IndexOB")), "depth": ("use_pass_z", ("Depth",))}
 """The passes besides the colours: the view layer's property, and the pass's names in Blender 5 and before."""
@@ -80,7 +80,7 @@ def _switched(layer, told):
 
 
 def _needed(told):
-    """Names, of any version of Blender, of what the requested pictures are made of."""
+    """Names, in any version of Blender, of the passes for the requested pictures."""
     parts = {"light": passes.NAMES, "objects": passes.NAMES, "materials": passes.MATERIALS}
     return {"Combined"}.union(*(parts[name] if name in parts else PASSES[name][1] for name in told["passes"]))
 

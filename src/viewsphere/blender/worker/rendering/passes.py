@@ -1,4 +1,4 @@
-"""Cycles' passes that part a picture's light, and those that say what surfaces are made of."""
+"""Cycles' passes that separate a picture's light, and the passes of surfaces' materials."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ MATERIALS = ("viewsphere roughness", "viewsphere metallic")
 """Names of the passes (AOVs) of materials, and of the nodes that fill them."""
 
 LEAST = "viewsphere least alpha"
-"""Name of the node that says how opaque a surface has to be to count as seen."""
+"""Name of the node with the minimum opacity for a surface to count as seen."""
 
 
 def ask_for_light(layer):
@@ -71,8 +71,8 @@ def materials(found):
 
 @contextmanager
 def sampled(scene, names, least):
-    """Change how Cycles samples meanwhile, for some passes: for `objects` the ground is not seen, and nothing is lit; for
-    `materials` it looks once through the middle of each pixel, past what is less opaque than `least`.
+    """Change how Cycles samples during the context, for some passes. For `objects` the ground is hidden and nothing is lit. For
+    `materials` each pixel has one sample at its centre, which ignores surfaces less opaque than `least`.
     """
     wanted = []
     if "objects" in names:

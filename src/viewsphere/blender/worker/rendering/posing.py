@@ -1,4 +1,4 @@
-"""A camera's pose, as the requests tell it, as Blender has it."""
+"""The conversion of a camera's pose from requests to Blender."""
 
 from __future__ import annotations
 

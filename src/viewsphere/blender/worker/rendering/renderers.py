@@ -10,7 +10,7 @@ import bpy
 from . import compositing
 
 ENOUGH = 8
-"""Samples per pixel from which on the normals pass helps the denoiser."""
+"""Samples per pixel from which the normals pass helps the denoiser."""
 
 FAINT = 1e-3
 """Light below which EEVEE ignores a lamp; a threshold of 0 would make EEVEE ignore all lamps."""
@@ -59,7 +59,7 @@ def _driver():
 
 
 def _choose(render, name):
-    """Make this the renderer; Blender 4.5 has another name for one."""
+    """Select the renderer; one of them has another name in Blender 4.5."""
     render.engine = {
         "cycles": "CYCLES",
         "eevee": "BLENDER_EEVEE" if bpy.app.version >= (5, 0, 0) else "BLENDER_EEVEE_NEXT",
@@ -74,7 +74,7 @@ def _set_up_cycles(scene, settings):
     cycles.use_adaptive_sampling = False
     cycles.use_light_tree = False
     cycles.max_bounces = settings["bounces"]
-    # Cycles counts each kind for itself, too, by default to four: too few where light goes back and forth between walls.
+    # Cycles also limits each kind of bounce, by default to four: too few for light between walls.
     cycles.diffuse_bounces = cycles.glossy_bounces = cycles.transmission_bounces = settings["bounces"]
     cycles.transparent_max_bounces = 16
     cycles.seed = 0
@@ -136,7 +136,7 @@ def _set_up_workbench(scene, settings):
 
 
 def _filter_evenly():
-    """Filter textures without regard to direction: with anisotropic filters, Mesa's software OpenGL does not come to an end for
+    """Filter textures without regard to direction: with anisotropic filters, Mesa's software OpenGL hangs on
     a texture that repeats up to a horizon.
     """
     bpy.context.preferences.system.anisotropic_filter = "FILTER_0"

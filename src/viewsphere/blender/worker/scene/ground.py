@@ -9,7 +9,7 @@ import bpy
 from .graph import Graph
 
 SKY = "viewsphere sky"
-"""Name of the node that says whether the sky is seen."""
+"""Name of the node that sets whether the sky is seen."""
 
 
 def fade(material, middle, fading, sky):

@@ -98,7 +98,7 @@ def _background(tree, place, image):
 
 
 def _columns(pixels):
-    """Columns of a map that says where the light of a picture (H, W, 3) comes from: as few as keep each cell even."""
+    """The smallest number of columns of a light map of a picture (H, W, 3) that keeps each cell even."""
     light = pixels.mean(axis=2, dtype=np.float64)
     height, width = light.shape
     size = 1

@@ -39,7 +39,7 @@ GREY = 0.02
 """Colours whose red, green and blue differ by less count as grey."""
 
 SHARP = 0.1
-"""Roughness up to which thin glass is taken as clear: it would scatter a hundredth of the light."""
+"""Roughness up to which thin glass counts as clear: it would scatter a hundredth of the light."""
 
 
 @dataclass(frozen=True)
@@ -93,14 +93,14 @@ def fill_material(material, told, images, has_uv, has_colors, is_traced=True):
 
 
 def _single_sided(graph, surface):
-    """The surface, through whose back cameras see: it casts shadows and is mirrored as it is."""
+    """The surface with a back that is invisible to cameras; shadows and reflections do not change."""
     camera = graph.node("ShaderNodeLightPath").outputs["Is Camera Ray"]
     back = graph.node("ShaderNodeNewGeometry").outputs["Backfacing"]
     return graph.mix(graph.product(camera, back), surface, _nothing(graph))
 
 
 def _tell(graph, told, look):
-    """Fill the passes of materials where the surface counts as seen; nobody evaluates these nodes unless they are asked for."""
+    """Fill the passes of materials where the surface counts as seen; these nodes are evaluated only for these passes."""
     seen = 1.0
     if look.alpha != 1 and told["transmission"] == 0:
         seen = graph.complement(_is_less(graph, look.alpha, graph.node("ShaderNodeValue", name=passes.LEAST).outputs[0]))

@@ -17,7 +17,7 @@ COLORS = "colors"
 
 @dataclass(frozen=True)
 class Images:
-    """A mesh's pictures as Blender images, made when first asked for: each file at most once as colour and once as data."""
+    """A mesh's pictures as Blender images, made at the first request: each file at most once as colour and once as data."""
 
     told: list
     made: dict

@@ -26,7 +26,7 @@ RINGS, SIDES = 12, 48
 def make_rig(scene, poses):
     """Target, sphere and the scene's camera, and a marker for each of the poses.
 
-    Returns the camera's largest error over all poses: in the scene's units, directions being compared at the distance of the
+    Returns the camera's largest error over all poses: in the scene's units; directions are compared at the distance of the
     target.
     """
     scene.frame_start, scene.frame_end = 1, len(poses)

@@ -43,7 +43,7 @@ def save(told):
 
 
 def _describe(scene, told):
-    """Store what viewsphere knows of the frames and objects as custom properties, and as a text."""
+    """Store viewsphere's facts about the frames and objects as custom properties, and as a text."""
     for name, value in told["properties"].items():
         scene[name] = value
     for one in scene.objects:
@@ -69,7 +69,7 @@ def _show(scene, told):
 
 
 def _lay_behind(scene, told, space):
-    """Compositor nodes that lay the picture over a background, which exposure and view transform leave unchanged."""
+    """Add compositor nodes that put the picture over a background; exposure and view transform do not change the background."""
     tree, out = _compositor(scene)
     behind, render = tree.nodes.new("CompositorNodeImage"), tree.nodes.new("CompositorNodeRLayers")
     dim, over = tree.nodes.new("CompositorNodeExposure"), tree.nodes.new("CompositorNodeAlphaOver")

@@ -23,11 +23,11 @@ finds objects that follow the camera.
 
 
 def run(scene, told):
-    """Call the script's `shade(scene, objects, shot)`: the scene, a dict of what is known of each of viewsphere's objects, and
-    of the shot.
+    """Call the script's `shade(scene, objects, shot)` with the scene, and dicts of facts about viewsphere's objects and about
+    the shot.
 
-    Raises ValueError with the script's line where it fails or leaves Python, and where what a camera sees of meshes, or how, is
-    not what it was: labels would not know.
+    Raises ValueError with the script's line if the script fails or exits, or if it changes the meshes that a camera sees or
+    their visibility, because labels would miss such changes.
     """
     placed = {one[ORDER]: one for one in scene.objects if ORDER in one}
     objects = {placed[order]: known for order, known in enumerate(told["things"])}
@@ -39,7 +39,7 @@ def run(scene, told):
             raise ValueError(f"expected a function {ENTRY}(scene, objects, shot), found none")
         space[ENTRY](scene, objects, told["shot"])
         after = _Standing.of(scene)
-    except BaseException as error:  # whatever a script raises is about the script, sys.exit, too
+    except BaseException as error:  # every exception is the script's error, including sys.exit
         lines = [frame.lineno for frame in traceback.extract_tb(error.__traceback__) if frame.filename == told["file"]]
         where = f", line {lines[-1]}" if lines else ""
         said = f"{type(error).__name__}: {error}".removesuffix(": ")

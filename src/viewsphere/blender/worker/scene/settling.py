@@ -48,7 +48,7 @@ def _number(scene, members):
 
 
 def _take_over(scene):
-    """Make all that is linked from libraries the file's own: a saved number or path would be the library's, and lost."""
+    """Make all linked library data local: a saved number or path would otherwise belong to the library and be lost."""
     if not bpy.data.libraries:
         return
     before = set(scene.objects)
@@ -112,7 +112,7 @@ class _Numbering:
         self._owners = list(apart)
 
     def _shown(self, depsgraph):
-        """Owner, object and instance of all that is shown and not viewsphere's own."""
+        """Owner, object and instance of everything that is shown, except viewsphere's own objects."""
         for instance in depsgraph.object_instances:
             owner = instance.parent if instance.is_instance else instance.object
             if instance.show_self and not is_placed(owner):

@@ -1,4 +1,4 @@
-"""A scene from plain data: meshes, objects, ground, lights and settings, as `engines.shared.blender.requests` tells them."""
+"""A scene from plain data: meshes, objects, ground, lights and settings, as sent by `engines.shared.blender.requests`."""
 
 from __future__ import annotations
 

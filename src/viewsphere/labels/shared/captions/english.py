@@ -15,10 +15,10 @@ PLURALS = {
     **{"echo": "echoes", "hero": "heroes", "potato": "potatoes", "tomato": "tomatoes"},
     **{name: name for name in ("aircraft", "deer", "fish", "scissors", "sheep", "series", "species")},
 }
-"""Words whose plural no rule gives."""
+"""Irregular plurals."""
 
 VOWEL = re.compile(r"(?!eu|one|ufo|uni|use|usu|uti)[aeiou]|heir|honest|honou?r|hour", re.IGNORECASE)
-"""The beginnings of words that take the article an."""
+"""The beginnings of words that take the article "an"."""
 
 
 def noun_of(category: str) -> str:
@@ -32,7 +32,7 @@ def number(count: int) -> str:
 
 
 def plural(noun: str, own: Mapping[str, str]) -> str:
-    """The plural of a noun: the user's `own` one, else that of its last word."""
+    """The plural of a noun: the user's `own` plural, else the plural of its last word."""
     if noun in own:
         return own[noun]
     before, space, last = noun.rpartition(" ")
@@ -59,12 +59,12 @@ def listed(words: Sequence[str]) -> str:
 
 
 def capital(sentence: str) -> str:
-    """The sentence with a capital at its beginning."""
+    """The sentence, beginning with a capital letter."""
     return sentence[:1].upper() + sentence[1:]
 
 
 FINISHES = ("glossy", "matte")
-"""Words for materials that stand before a colour."""
+"""Words for materials that precede a colour."""
 
 
 def noun_phrase(noun: str, color: str = "", material: str = "") -> str:

@@ -16,7 +16,7 @@ from viewsphere.model.sample import ObjectAnnotation, Sample
 from viewsphere.validation.errors import one_of, shown
 
 LONGEST = 1000
-"""Characters of a template."""
+"""Maximum number of characters in a template."""
 
 OF_PICTURE = ("count", "list", "categories", "weather", "surroundings")
 OF_OBJECT = ("object", "description", "category", "color", "material", "place", "size", "view", "relation")
@@ -28,7 +28,7 @@ SKY = ("The sky is clear.", "The sky is partly cloudy.", "The sky is overcast.",
 
 @dataclass(frozen=True)
 class Caption:
-    """A sentence, its form, and the ids of the objects that it is of."""
+    """A sentence, its form, and the ids of the objects in it."""
 
     text: str
     form: str
@@ -69,19 +69,19 @@ AnyPlural = Annotated[str, Field(max_length=LONGEST), AfterValidator(_plural)]
 
 @dataclass(frozen=True)
 class Filled:
-    """Fields of a template, and the words for them, empty where there are none."""
+    """Fields of a template with their words; a word is empty if there is none."""
 
     fields: frozenset[str]
     words: Mapping[str, str]
 
     @property
     def is_whole(self) -> bool:
-        """Return whether there are words for all fields."""
+        """Return whether all fields have words."""
         return all(self.words.get(name) for name in self.fields)
 
     @property
     def may_be_whole(self) -> bool:
-        """Return whether there are words for all fields but those of objects."""
+        """Return whether all fields except those of objects have words."""
         return all(self.words.get(name) for name in self.fields.intersection(OF_PICTURE))
 
     def text(self, template: str) -> str:
@@ -90,8 +90,8 @@ class Filled:
 
 
 def wrong(sample: Sample, caption: Caption, objects: Sequence[ObjectAnnotation], fronts: Sequence[bool]) -> str | None:
-    """Return the caption that a sample's other labels require, where the given one differs; else None. `objects` are the
-    objects of the caption, and `fronts` states for each whether it has a front.
+    """Return the caption that a sample's other labels require if the given caption differs from it, else None. `objects` are
+    the objects of the caption; `fronts` gives for each whether it has a front.
     """
     text = caption.text
     match caption.form:
@@ -115,20 +115,20 @@ def wrong(sample: Sample, caption: Caption, objects: Sequence[ObjectAnnotation],
 
 
 def _phrases(sample: Sample, o: ObjectAnnotation) -> list[tuple[str, Words]]:
-    """Return every noun phrase of an object; none where its appearance is unknown."""
+    """Return every noun phrase of an object; none if its appearance is unknown."""
     if "looks" not in sample.requested:
         return []
     return list(phrases(o, (o.color or "", o.material or "")))
 
 
 def grouped(told: Iterable[ObjectAnnotation]) -> list[tuple[str, int]]:
-    """Nouns and how many there are of each: most first, then by their letters, as a merge numbers categories anew."""
+    """Nouns with their counts, most frequent first, then alphabetically: merging data sets changes category numbers."""
     counts = Counter(noun_of(o.category) for o in told)
     return sorted(counts.items(), key=lambda entry: (-entry[1], entry[0]))
 
 
 def listing(groups: Iterable[tuple[str, int]], plurals: Mapping[str, str]) -> str:
-    """Nouns with their numbers: three chairs and a car."""
+    """Nouns with their counts in words: three chairs and a car."""
     return listed([with_article(noun) if n == 1 else f"{number(n)} {plural(noun, plurals)}" for noun, n in groups])
 
 
@@ -169,7 +169,8 @@ Phrase = tuple[ObjectAnnotation, str, Words]
 
 
 def related(first: Phrase, relation: str, second: Phrase) -> str:
-    """The sentence that says of one object that it has a relation to another; `another` of what could be said of both."""
+    """The sentence that states an object's relation to another object. If both have the same phrase, the second gets `another`.
+    """
     (one, phrase, own), (other, landmark, its) = first, second
     is_alike = noun_of(one.category) == noun_of(other.category) and set(its) <= {*own, ""}
     return capital(f"{with_article(phrase)} is {relation} {f'another {landmark}' if is_alike else with_article(landmark)}.")

@@ -22,31 +22,31 @@ if TYPE_CHECKING:
     from viewsphere.labels.shared.context import LabelContext
 
 SEEN = 16
-"""Visible pixels from which on an object is told of, if enough of it is visible."""
+"""Minimum number of visible pixels for captions to mention an object, if enough of it is visible."""
 
 MIN_VISIBILITY = 0.1
-"""`visibility` from which on an object is told of by default."""
+"""Default minimum `visibility` for captions to mention an object."""
 
 LARGE, SMALL = 0.2, 0.01
-"""Shares of the picture from which on, and up to which, something is told of an object's size."""
+"""Shares of the picture: an object counts as large from the first on, as small up to the second."""
 
 HIDDEN = 0.3
-"""Share of what is in the picture from which on an object is partly hidden."""
+"""Hidden share of an object's part inside the picture from which it counts as partly hidden."""
 
 CUT = 0.1
-"""`truncation` from which on an object is partly outside the picture."""
+"""`truncation` from which an object counts as partly outside the picture."""
 
 STEEP, RAISED = 60.0, 30.0
-"""Degrees of elevation from which on an object is seen from above, and from which on from a side and from above."""
+"""Degrees of elevation: from the first an object is seen from above, from the second from a side and from above."""
 
 NEARER = 0.9
-"""Share of another's distance up to which an object is the nearer one."""
+"""Share of another object's distance up to which an object counts as nearer."""
 
 SUNK = 0.05
-"""Share of its height by which an object may reach above the lowest point of what is above it."""
+"""Share of its height by which an object may reach above the lowest point of an object above it."""
 
 BESIDE = 1.25
-"""Times the sum of half their diagonals that the middles of objects are apart at most that are next to one another."""
+"""Maximum distance between the middles of neighbouring objects, as a multiple of the sum of half their diagonals."""
 
 PLACES = (
     ("at the top left", "at the top", "at the top right"),
@@ -57,13 +57,13 @@ SIDES = ("front", "front left", "left", "back left", "back", "back right", "righ
 RELATIONS = ("to the left of", "to the right of", "in front of", "behind", "above", "below", "next to")
 
 Words = tuple[str, str]
-"""Of colour and material, empty where there is none."""
+"""Words for colour and material; empty if there is none."""
 
 Truths = NDArray[np.bool_]
 
 
 def words_of(context: LabelContext) -> Mapping[int, Words]:
-    """For each id the words for what the object looks like, as the shot paints it."""
+    """The words for each object's appearance in the shot, by id."""
 
     def all_words() -> Mapping[int, Words]:
         scenery = context.get(ShotAppearance())
@@ -81,12 +81,12 @@ def words_of(context: LabelContext) -> Mapping[int, Words]:
 
 
 def is_told(o: ObjectAnnotation, least: float) -> bool:
-    """Return whether sentences name an object: enough of it is seen."""
+    """Return whether enough of an object is visible for sentences to name it."""
     return o.box2d is not None and o.area >= SEEN and o.visibility >= least
 
 
 def phrases(o: ObjectAnnotation, said: Words) -> Iterator[tuple[str, Words]]:
-    """The noun phrases of an object with the words that each has, from none on: none, colour, material, both."""
+    """The noun phrases of an object, each with its words: none, colour, material, both."""
     noun, (color, material) = noun_of(o.category), said
     for has_material, has_color in product((False, True), repeat=2):
         if (color or not has_color) and (material or not has_material):
@@ -110,13 +110,13 @@ def _third(value: float, size: int) -> int:
 
 
 def size_of(area: int, width: int, height: int) -> str:
-    """`large` or `small` in a picture of this size, empty for what is neither."""
+    """`large` or `small` in a picture of this size; empty if neither."""
     share = area / (width * height)
     return "large" if share >= LARGE else "small" if share <= SMALL else ""
 
 
 def is_hidden(o: ObjectAnnotation) -> bool:
-    """Return whether much of what is in the picture of an object is hidden."""
+    """Return whether much of an object's part inside the picture is hidden."""
     return o.truncation < 1 and 1 - o.visibility / (1 - o.truncation) >= HIDDEN
 
 
@@ -126,7 +126,7 @@ def is_cut(o: ObjectAnnotation) -> bool:
 
 
 def side_of(o: ObjectAnnotation) -> str:
-    """From where the camera sees an object, in words."""
+    """The side from which the camera sees an object, in words."""
     elevation = o.view.elevation_deg
     if abs(elevation) >= STEEP:
         return "above" if elevation > 0 else "below"
@@ -137,13 +137,13 @@ def side_of(o: ObjectAnnotation) -> str:
 
 
 def has_front(facts: ModelFacts | None) -> bool:
-    """Return whether a model is not known to look the same from several sides."""
+    """Return whether a model has a front; a model known to look the same from several sides has none."""
     known = None if facts is None else facts.symmetries
     return known is None or not (known.discrete or known.continuous)
 
 
 ONE = ("place", "size", "hidden", "cut", "view")
-"""Forms of sentences that say something of one object."""
+"""Forms of sentences about a single object."""
 
 
 def of_one(form: str, o: ObjectAnnotation, size: tuple[int, int], has_front: bool) -> str:
@@ -171,7 +171,7 @@ class Company:
 
     @cached_property
     def relations(self) -> Mapping[str, Truths]:
-        """For each relation (N, N) whether it holds of the row's object to the column's."""
+        """For each relation a mask (N, N): True where the row's object has the relation to the column's."""
         x0, y0, x1, y1 = np.array([o.box2d for o in self.objects], np.float64).reshape(-1, 4).T
         boxes = np.array([o.box3d for o in self.objects]).reshape(-1, 8, 3)
         low, high = boxes.min(axis=1), boxes.max(axis=1)
@@ -187,7 +187,7 @@ class Company:
 
     @cached_property
     def distances(self) -> NDArray[np.float64]:
-        """From the camera to the middles of the objects, (N,) metres."""
+        """The distances from the camera to the middles of the objects, (N,) metres."""
         return np.array([o.view.distance for o in self.objects])
 
 

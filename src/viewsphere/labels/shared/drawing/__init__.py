@@ -1,1 +1,1 @@
-"""Colours, lines and small maps with which labels are drawn."""
+"""Colours, lines and small maps for the drawings of labels."""

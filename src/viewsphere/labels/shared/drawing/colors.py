@@ -1,4 +1,4 @@
-"""Colours that labels are drawn in."""
+"""Colours for the drawings of labels."""
 
 from __future__ import annotations
 
@@ -17,12 +17,11 @@ def color_of(object_id: int) -> Color:
 
 
 GOLDEN = 0.618034
-"""The golden section: its multiples, less whole numbers, lie far apart."""
+"""The golden section: the fractional parts of its multiples are far apart."""
 
 
 def by_number(picture: NDArray[np.uint8], numbers: NDArray[np.int32]) -> NDArray[np.uint8]:
-    """The picture (H, W, 3), grey, with every number above 0 in a colour of its own: neighbouring ones are far apart on the
-    wheel of hues.
+    """The picture (H, W, 3) in grey, with a separate colour for every number above 0. Neighbouring numbers have distant hues.
     """
     grey = picture.mean(axis=2, keepdims=True).repeat(3, axis=2)
     hue = (numbers * GOLDEN)[..., None] % 1 + np.array([0, 2 / 3, 1 / 3])

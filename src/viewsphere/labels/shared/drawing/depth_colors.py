@@ -8,19 +8,19 @@ from numpy.typing import NDArray
 from viewsphere.labels.shared.spec import Extent, Picture
 
 NEAREST = 0.01
-"""Metres that a picture of depth tells apart from less."""
+"""Smallest depth in metres that a picture of depth distinguishes."""
 
 
 def extent(depth: NDArray[np.float32]) -> Extent:
-    """The nearest depth, and that which 98 % of the pixels do not exceed, so that a ground up to the horizon leaves greys."""
+    """The nearest depth, and the depth that 98 % of the pixels do not exceed; a ground up to the horizon then leaves greys."""
     seen = depth[np.isfinite(depth)]
     return (0.0, 0.0) if not seen.size else (float(seen.min()), float(np.percentile(seen, 98)))
 
 
 def nearness(depth: NDArray[np.float32], within: Extent) -> NDArray[np.float64]:
-    """From 1 at the extent's near end to 0 at its far end and beyond, (H, W), 0 too where there is no depth.
+    """Nearness (H, W) from 1 at the extent's near end to 0 at its far end and beyond; also 0 where there is no depth.
 
-    Twice as far is as much less everywhere, else a street's horizon would leave its cars one white.
+    The scale is logarithmic. On a linear scale a street's horizon would leave its cars a uniform white.
     """
     near, far = (max(end, NEAREST) for end in within)
     times = np.log(np.clip(depth, near, max(near, far)) / near)

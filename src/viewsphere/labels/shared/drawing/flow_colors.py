@@ -9,7 +9,7 @@ from viewsphere.labels.shared.spec import Drawing
 
 Picture = NDArray[np.uint8]
 STEPS = ((15, 0, 1, 1), (6, 1, 0, -1), (4, 1, 2, 1), (11, 2, 1, -1), (13, 2, 0, 1), (6, 0, 2, -1))
-"""Parts of the wheel: how many colours it has, which of red, green and blue stays, which changes, and whether it rises."""
+"""Parts of the wheel: the number of colours, the constant component, the changing component, and whether it rises."""
 
 DARKER = 0.75
 """Factor of colours beyond the longest flow."""
@@ -18,7 +18,7 @@ DARKER = 0.75
 def wheel() -> NDArray[np.float64]:
     """The 55 colours of Baker et al. 2007, "A Database and Evaluation Methodology for Optical Flow", (55, 3), 0 to 255.
 
-    They are those of the code that goes with the paper, https://vision.middlebury.edu/flow/code/ (colorcode.cpp).
+    They are from the paper's code, https://vision.middlebury.edu/flow/code/ (colorcode.cpp).
     """
     parts = list[NDArray[np.float64]]()
     for count, full, changing, way in STEPS:
@@ -30,22 +30,22 @@ def wheel() -> NDArray[np.float64]:
 
 
 MOST, NEAR = 99.0, 75.0
-"""Percentages of the pixels whose flow has full colours: of flow in the picture, and of scene flow, which has no bound towards
-the horizon.
+"""Percentages of the pixels that define the full colour: for flow in the picture, and for scene flow, which is unbounded
+towards the horizon.
 """
 
 
 def longest_of(flow: NDArray[np.floating], most: float = MOST) -> float:
-    """The length of flow (H, W, 2) that so many per cent of the pixels do not exceed; 1 where there is none."""
+    """The length of flow (H, W, 2) that this percentage of the pixels does not exceed; 1 without flow."""
     length = np.hypot(flow[..., 0], flow[..., 1], dtype=np.float64)
     known = length[np.isfinite(length)]
     return float(np.percentile(known, most)) if known.size else 1.0
 
 
 def picture(flow: NDArray[np.floating], longest: float | None = None) -> Picture:
-    """Flow (H, W, 2) as a picture (H, W, 3) uint8: white is none, black where it is NaN.
+    """Flow (H, W, 2) as a picture (H, W, 3) uint8: white without flow, black where it is NaN.
 
-    `longest` flow has the full colour; by default that which 99 % of the pixels do not exceed.
+    Flow of the length `longest` has the full colour; the default is the length that 99 % of the pixels do not exceed.
     """
     known: NDArray[np.bool_] = np.isfinite(flow[..., 0] + flow[..., 1])
     u, v = np.where(known[..., None], flow, 0.0).astype(np.float64).transpose(2, 0, 1)

@@ -18,13 +18,13 @@ if TYPE_CHECKING:
 OWN, PREVIOUS, NEXT = (255, 255, 255), (240, 170, 40), (20, 170, 180)
 FAINT, WORDS = (92, 98, 112), (170, 176, 188)
 SHARE, LEAST = 0.4, 56
-"""The map's side, as a share of the picture's shorter one, and in pixels at least."""
+"""The map's side as a share of the picture's shorter side, and its minimum in pixels."""
 
 STILL = 1e-6
-"""Metres; what lies nearer is at the same place."""
+"""Distance in metres below which two cameras count as being at the same place."""
 
 Placed = tuple[NDArray[np.float64], Color]
-"""A camera's pose (4, 4), from its axes to those of the picture's own, and its colour."""
+"""A camera's pose (4, 4), from its axes to the axes of the picture's own camera, and its colour."""
 
 
 def inset(
@@ -63,7 +63,7 @@ def _circle(pen: ImageDraw, center: NDArray[np.float64], radius: float, zoom: fl
 
 
 def _camera(pen: ImageDraw, place: NDArray[np.float64], pose: NDArray[np.float64], length: float, color: Color) -> None:
-    """A wedge that opens to where the camera looks."""
+    """A wedge that opens in the camera's viewing direction."""
     ahead, aside = (pose[[0, 2], axis] * (1, -1) for axis in (2, 0))
     ends = [tuple((place + length * (ahead + 0.5 * turn * aside)).tolist()) for turn in (-1, 1)]
     x, y = place.tolist()

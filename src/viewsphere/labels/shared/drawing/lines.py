@@ -1,4 +1,4 @@
-"""Lines and words that labels are drawn with, over a picture."""
+"""Lines and words that drawings of labels put over a picture."""
 
 from __future__ import annotations
 
@@ -20,20 +20,20 @@ if TYPE_CHECKING:
     from PIL.ImageDraw import ImageDraw
 
 FAR = 1e5
-"""Pixels; a line that leads farther off, as of what is beside the lens, is left out."""
+"""Pixels; a line that leads farther away, such as to a point beside the lens, is left out."""
 INK, PAPER = (30, 32, 36), (250, 250, 248)
 MARGIN = 6
-"""Pixels between the edge of paper and what is written on it."""
+"""Pixels between the edge of the paper and the text."""
 
 ALPHABET = "abcdefghijklmnopqrstuvwxyz"
-"""Letters whose mean width is that of a text's."""
+"""Letters whose mean width estimates a text's mean letter width."""
 
 HEAD = 0.25
 """Length of an arrow's head, as a share of the arrow."""
 
 
 def in_space(pen: ImageDraw, sample: Sample, scale: float, points: NDArray[np.float64], color: Color, width: int = 2) -> None:
-    """A line through points (N, 3) of the world; what the lens does not show is left out."""
+    """A line through points (N, 3) of the world, without the parts that the lens does not show."""
     camera = sample.camera
     pixels = project(camera.intrinsics, transform(camera.R, points) + camera.t)[0] * scale
     for a, b in zip(pixels[:-1].tolist(), pixels[1:].tolist(), strict=True):
@@ -46,7 +46,7 @@ AXES = ((220, 50, 40), (40, 160, 60), (50, 90, 230))
 
 
 def axes(pen: ImageDraw, sample: Sample, scale: float, camera_from_axes: NDArray[np.float64], size: float) -> None:
-    """Three axes that are so many metres long: x red, y green, z blue."""
+    """Three axes of the given length in metres: x red, y green, z blue."""
     camera = sample.camera
     ends = transform(camera_from_axes, np.vstack([np.zeros(3), size * np.eye(3)]))
     in_world = transform(camera.R.T, ends - camera.t)
@@ -55,7 +55,7 @@ def axes(pen: ImageDraw, sample: Sample, scale: float, camera_from_axes: NDArray
 
 
 def arrow(pen: ImageDraw, start: tuple[float, float], end: tuple[float, float], color: Color, width: int = 2) -> None:
-    """From one place of the picture to another."""
+    """An arrow from one place in the picture to another."""
     a, b = np.array(start), np.array(end)
     along = (b - a) * HEAD
     across = np.array([-along[1], along[0]]) / 2
@@ -65,13 +65,13 @@ def arrow(pen: ImageDraw, start: tuple[float, float], end: tuple[float, float], 
 
 
 def middle(o: ObjectAnnotation) -> tuple[float, float] | None:
-    """The middle of an object's box in the picture, of what is seen of it or else of the whole; None where it is not there."""
+    """The middle of an object's box in the picture: of its visible part, or else of the whole object; None without a box."""
     box = o.box2d or o.box2d_projected
     return None if box is None else ((box[0] + box[2]) / 2, (box[1] + box[3]) / 2)
 
 
 def written(sentences: Sequence[str], width: int, height: int) -> Picture:
-    """Sentences on paper of this size, (H, W, 3) uint8: each begins a line; as many as there is room for."""
+    """Sentences on paper of this size, (H, W, 3) uint8: each begins a new line; sentences without room are left out."""
     from PIL import Image, ImageDraw
 
     paper = Image.new("RGB", (width, height), PAPER)
@@ -85,7 +85,7 @@ def written(sentences: Sequence[str], width: int, height: int) -> Picture:
 
 
 def note(pen: ImageDraw, o: ObjectAnnotation, scale: float, words: str, color: Color) -> None:
-    """Words at the upper left corner of an object's box, on a ground of its colour."""
+    """Words at the upper left corner of an object's box, on a background of its colour."""
     box = o.box2d or o.box2d_projected
     if box is not None:
         x, y = box[0] * scale, box[1] * scale
@@ -94,7 +94,7 @@ def note(pen: ImageDraw, o: ObjectAnnotation, scale: float, words: str, color: C
 
 
 def notes(words: Callable[[ObjectAnnotation], str]) -> Callable[[ImageDraw, Sample, float], None]:
-    """A drawing's lines: words on each object that is in the picture, in its colour."""
+    """A drawing of words on each object in the picture, in the object's colour."""
 
     def draw(pen: ImageDraw, sample: Sample, scale: float) -> None:
         for o in sample.objects:

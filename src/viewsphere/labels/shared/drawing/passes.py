@@ -1,4 +1,4 @@
-"""The drawings that preview and report use for the passes that engines paint beside pictures; passes are not labels."""
+"""The drawings in previews and reports for the passes that engines paint beside pictures; passes are not labels."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from viewsphere.rendering.view import develop, to_bytes
 
 
 def picture(name: str, array: NDArray[np.float32]) -> Picture:
-    """A pass as a picture (H, W, 3) uint8: light as pictures show it, albedo as sRGB, other shares as greys."""
+    """A pass as a picture (H, W, 3) uint8: light developed as in pictures, albedo as sRGB, other shares as greys."""
     if PASSES[name].components == 1:
         return np.repeat((np.clip(array, 0, 1) * 255).round().astype(np.uint8)[..., None], 3, axis=2)
     if name == "albedo":
@@ -26,4 +26,4 @@ def _drawing(name: str) -> Drawing:
 
 
 DRAWINGS = {name: _drawing(name) for name in PASSES if name not in PICTURES}
-"""Of each pass but the pictures, by its name."""
+"""The drawing of each pass except pictures, by its name."""

@@ -17,11 +17,11 @@ SKY = (16, 18, 24)
 GRID = (52, 56, 66)
 LOW, HIGH = np.array([70.0, 80.0, 96.0]), np.array([225.0, 230.0, 236.0])
 NEAREST, MOST = 2.0, 98.0
-"""Metres that are shown at least, and the percentage of points."""
+"""Minimum radius of the map in metres, and the percentage of points that it shows."""
 
 
 def from_above(sample: Sample, size: int) -> Picture:
-    """A picture (size, size, 3) of a sample's points: objects in their colours, with their boxes; all others are lighter the
+    """A picture (size, size, 3) of a sample's points: objects in their colours, with their boxes; other points are lighter the
     higher they are.
 
     The circles are at round distances; the sensor is in the middle.
@@ -45,13 +45,13 @@ def from_above(sample: Sample, size: int) -> Picture:
     column = np.floor(size / 2 - xyz[:, 1] * scale).astype(int)
     row = np.floor(size / 2 - xyz[:, 0] * scale).astype(int)
     inside = (column >= 0) & (column < size) & (row >= 0) & (row < size)
-    order = np.flatnonzero(inside)[np.argsort(xyz[inside, 2], kind="stable")]  # high ones last
+    order = np.flatnonzero(inside)[np.argsort(xyz[inside, 2], kind="stable")]  # high points last
     out[row[order], column[order]] = _colors(rows, xyz[:, 2])[order]
     return out
 
 
 def _colors(rows: NDArray[np.void], height: NDArray[np.float64]) -> Picture:
-    """Of each point, (N, 3)."""
+    """The colour of each point, (N, 3)."""
     low, high = np.percentile(height, (1, 99)) if len(height) else (0.0, 1.0)
     share = np.clip((height - low) / max(high - low, 1e-6), 0.0, 1.0)[:, None]
     out = (LOW + share * (HIGH - LOW)).astype(np.uint8)
@@ -62,6 +62,6 @@ def _colors(rows: NDArray[np.void], height: NDArray[np.float64]) -> Picture:
 
 
 def round_length(length: float) -> float:
-    """1, 2 or 5 times a power of ten, at most this."""
+    """The largest of 1, 2 and 5 times a power of ten that is at most this length."""
     power = 10.0 ** math.floor(math.log10(length))
     return max(times * power for times in (1, 2, 5) if times * power <= length)

@@ -23,10 +23,10 @@ DOWN = np.array([-math.sin(RISE) * math.cos(TURN), -math.cos(RISE), -math.sin(RI
 """Directions of the picture among the grid's axes ahead, up and right."""
 
 FACES = ((1, 1, 1.0), (0, -1, 0.75), (2, -1, 0.55))
-"""The sides of cells that are seen: axis, which way they face, how light they are."""
+"""The visible sides of cells: axis, direction that they face, brightness."""
 
 MARGIN = 0.96
-"""Share of the picture that is filled."""
+"""Share of the picture that the voxels fill."""
 
 
 def drawn(sample: Sample) -> Picture:
@@ -64,7 +64,7 @@ def _light(full: NDArray[np.bool_]) -> NDArray[np.float32]:
 
 
 def _put(out: Picture, cells: Float, color: Picture) -> None:
-    """Paint cells (N, 3), far ones first, as large as fits."""
+    """Paint cells (N, 3), far cells first, as large as fits."""
     height, width = out.shape[:2]
     order = np.argsort(-_along(cells, INTO), kind="stable")
     x, y = _along(cells[order], ACROSS), _along(cells[order], DOWN)
