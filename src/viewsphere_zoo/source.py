@@ -18,7 +18,7 @@ CREDIT = Credit(licence="Apache-2.0", attribution="The viewsphere contributors")
 
 
 def expand(name: str) -> tuple[str, ...]:
-    """The families that a name stands for; raises UserError for an unknown one."""
+    """The families that a name selects. Raises UserError for an unknown name."""
     if name == ANY:
         return things()
     if name not in family_names():
@@ -37,14 +37,14 @@ def credit(model: ModelSpec) -> Credit | None:
 
 
 def bodies_file() -> str | None:
-    """The file of MakeHuman's bodies, if it was made."""
+    """The file of MakeHuman's bodies; None if it does not exist."""
     from viewsphere_zoo.people import makehuman
 
     return makehuman.where()
 
 
 def fetch_bodies(report: Callable[[str], None]) -> None:
-    """Download MakeHuman's bodies (CC0, 48 MB) and keep 2 MB of them."""
+    """Download MakeHuman's bodies (CC0, 48 MB) and store the 2 MB that people need."""
     from viewsphere_zoo.people import makehuman
 
     makehuman.set_up(report)

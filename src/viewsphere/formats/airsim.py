@@ -63,18 +63,18 @@ KINDS: Mapping[Kind, tuple[int, str, str]] = {
     "segmentation": (5, "png", "instances"),
     "infrared": (7, "png", "instances"),
 }
-"""The number of each type of images, its ending, and the channel that it is made of."""
+"""The number of each image type, its file ending, and its channel."""
 
 HEAD = "VehicleName TimeStamp POS_X POS_Y POS_Z Q_W Q_X Q_Y Q_Z ImageFile".replace(" ", "\t")
 NOTHING = 65504.0
 MOST = 255
 NED = np.array([[0.0, 1, 0], [1, 0, 0], [0, 0, -1]])
 BODY = np.array([[0.0, 1, 0], [0, 0, 1], [1, 0, 0]])
-"""From a body's axes (ahead, right, down) to those of a camera (right, down, ahead)."""
+"""The rotation from a body's axes (ahead, right, down) to a camera's (right, down, ahead)."""
 
 
 class Options(Frozen):
-    """The types of images that are recorded."""
+    """The image types to record."""
 
     images: tuple[Kind, ...] = Field(
         default=("scene", "depth_planar", "segmentation"),
@@ -89,7 +89,9 @@ def needs(options: Options) -> tuple[str, ...]:
 
 
 def refuses(scope: Scope, options: Options) -> Iterator[str]:
-    """Labels and cameras that nobody knows; lenses that are more than an angle of view; more objects than colours."""
+    """Reasons to refuse: unknown labels or cameras, lenses that need more than an angle of view, and more objects than
+    colours.
+    """
     yield from refusals.lacking_labels(scope, needs(options))
     yield from refusals.known_cameras(scope)
     yield from refusals.pinhole(scope)
@@ -108,7 +110,7 @@ class AirSim(Tree):
         self._kinds = tuple(dict.fromkeys(options.images))
 
     def of(self, sample: Sample) -> Iterator[File | Piece]:
-        """The images of a sensor at an instant, a line of the log, and what the sensor is."""
+        """The images of a sensor at an instant, a line of the log, and the sensor's settings."""
         root = scene(sample) if sample.sequence else sample.split or "all"
         seconds = sample.time if sample.sequence else sample.index / 1000
         names: list[str] = []
@@ -121,7 +123,7 @@ class AirSim(Tree):
         yield Piece(f"{root}/settings.json", b"", json.dumps([sample.sensor, self._settings(sample.camera)]))
 
     def layout(self, path: str, counts: Mapping[str, int]) -> Layout:
-        """The log with its head; the settings, of which each sensor's are the name of a section."""
+        """The log with its header, and the settings; each sensor's settings are the name of a section."""
         if not path.endswith("settings.json"):
             return (f"{HEAD}\n".encode(), "")
         told = sorted(json.loads(section) for section in counts)
@@ -167,7 +169,7 @@ def _grey(sample: Sample) -> bytes:
 
 
 def _floats(sample: Sample, channel: str) -> bytes:
-    """A PFM, its highest row first."""
+    """A PFM file with the highest row first."""
     array: NDArray[np.float32] = sample.channels[channel]
     if channel == "disparity":
         array = np.nan_to_num(array / np.float32(sample.width))

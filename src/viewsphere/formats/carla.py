@@ -54,7 +54,7 @@ FAR = 1000.0
 STEPS = 256**3 - 1
 MOST = 65535
 LEVEL = 1e-9
-"""Of an axis: how far from straight up or down it still counts as that."""
+"""Tolerance within which an axis counts as pointing straight up or down."""
 
 TAGS = (
     "Unlabeled", "Roads", "SideWalks", "Building", "Wall", "Fence", "Pole", "TrafficLight", "TrafficSign", "Vegetation",
@@ -85,7 +85,7 @@ STUFF = {
 
 
 def refuses(scope: Scope) -> Iterator[str]:
-    """Cameras that nobody knows; lenses that are more than an angle of view; more objects than ids have numbers."""
+    """Reasons to refuse: unknown cameras, lenses that need more than an angle of view, and more objects than ids."""
     yield from refusals.known_cameras(scope)
     yield from refusals.pinhole(scope)
     yield from refusals.centred(scope)
@@ -146,7 +146,9 @@ Float = NDArray[np.float64]
 
 
 def transform(place: Float, ahead: Float, right: Float, up: Float) -> dict[str, dict[str, float]]:
-    """A place and axes of our world as CARLA's location and rotation. Of what looks straight up or down, roll is 0."""
+    """A position and axes of viewsphere's world as CARLA's location and rotation. Roll is 0 for axes that look straight up or
+    down.
+    """
     x, y, z = place.tolist()
     level = math.hypot(ahead[0], ahead[1])
     yaw, roll = math.atan2(-ahead[1], ahead[0]), math.atan2(-right[2], up[2])
@@ -166,7 +168,7 @@ def _depth(sample: Sample) -> bytes:
 
 
 def _tagged(sample: Sample, tags: NDArray[np.uint8], *, ids: bool) -> bytes:
-    """Tags in red, and, asked for, ids of objects in green, low bytes, and blue."""
+    """Tags in red and, on request, object ids in green (the low byte) and blue."""
     number = sample.channels["instances"].astype(np.int64) * ids
     return encode_png(np.dstack((tags[sample.channels["semantic"]], number & 255, number >> 8)).astype(np.uint8))
 

@@ -60,7 +60,7 @@ class CocoPanoptic(Tree):
         yield item(f"{file}.json", told, "annotations")
 
     def layout(self, path: str, counts: Mapping[str, int]) -> Layout:
-        """Categories, and then what samples add."""
+        """Categories, followed by the entries of samples."""
         supers = {thing_class(category.id): category.supercategory for category in self.dataset.categories}
         head = {
             "info": {"description": self.dataset.name, "version": "1.0"},
@@ -87,7 +87,7 @@ class CocoPanoptic(Tree):
 
 
 def _segment_ids(codes: NDArray[np.int32]) -> NDArray[np.int64]:
-    """Ids (H, W): objects' own, and of stuff its class above them."""
+    """Segment ids (H, W): object ids, and for stuff its class above them."""
     objects = object_of(codes).astype(np.int64)
     return np.where(objects > 0, objects, codes)
 

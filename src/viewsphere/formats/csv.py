@@ -44,7 +44,7 @@ OF_OBJECT = (
     "truncation",
     "pose_category",
 )
-OF_VIEW = ("azimuth_deg", "elevation_deg", "distance", "tilt_deg")  # of the camera, as the object sees it
+OF_VIEW = ("azimuth_deg", "elevation_deg", "distance", "tilt_deg")  # of the camera, seen from the object
 LISTS = {
     **dict.fromkeys(BOXES, ("x0", "y0", "x1", "y1")),
     "quaternion": ("w", "x", "y", "z"),  # of camera_from_object
@@ -113,7 +113,7 @@ def _name(sample: Sample) -> str:
 
 @contextmanager
 def _table(file: Path) -> Generator[Callable[[list[list[Any]]], None]]:
-    """An open table with its head, and the function that appends rows."""
+    """An open table with its header, and the function that appends rows."""
     with file.open("w", encoding="utf-8", newline="") as out:
         rows = csv.writer(out, lineterminator="\n")
         rows.writerow(HEAD)
@@ -138,17 +138,17 @@ def _values(o: ObjectAnnotation) -> Iterator[Any]:
 
 
 def _cell(value: Any) -> Any:
-    """Numbers in as many digits as they need to be read back equal; NaN and None are empty."""
+    """The text of a cell: numbers with enough digits to be read back exactly; NaN and None are empty."""
     return "" if value is None or (isinstance(value, float) and math.isnan(value)) else value
 
 
 def _safe(value: Any) -> Any:
-    """The cell, which no spreadsheet takes for a formula."""
+    """The cell in a form that no spreadsheet runs as a formula."""
     return f"'{value}" if isinstance(value, str) and value.startswith(FORMULA) else _cell(value)
 
 
 def _rows_that_differ(wanted: Path, found: Path) -> Iterator[Remark]:
-    """Rows of two tables, one after another."""
+    """Yield the differing rows of two tables."""
     with open_file(wanted) as ours, open_file(found) as theirs:
         for number, (one, other) in enumerate(zip_longest(ours, theirs, fillvalue=b"")):
             if one != other:
@@ -165,7 +165,7 @@ FORMAT = FormatSpec(
     holds=("boxes", "poses", "views", "sizes"),
     read_by=("pandas", "any spreadsheet"),
     options=Options,
-    channels=(),  # pictures are taken where there are any
+    channels=(),  # pictures are used if there are any
     names_credits=False,
     writer=writer,
     preparer=preparer,

@@ -47,7 +47,7 @@ class Options(Frozen):
 
 
 def refuses(scope: Scope, options: Options) -> Iterator[str]:
-    """Names that XML cannot hold."""
+    """Reasons to refuse: names that XML cannot hold."""
     yield from plain_names(scope, NAMES, "of one line, that XML can hold")
 
 

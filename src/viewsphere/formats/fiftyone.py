@@ -42,10 +42,10 @@ from viewsphere.store import Dataset
 KINDS = (".png", ".jpg", ".webp")
 MILLIMETRE = 0.001
 NAN = {"$numberDouble": "NaN"}
-"""The placeholder of a NaN until `_json` has written it: no text of JSON looks so."""
+"""The placeholder of a NaN until `_json` has written it; no JSON text looks like this."""
 
 STATES = (0, 1)
-"""Of points in the picture: visible, occluded."""
+"""States of points in the picture: visible, occluded."""
 
 
 class FiftyOne(Tree):
@@ -147,7 +147,9 @@ def _detection(sample: Sample, o: ObjectAnnotation) -> dict[str, Any]:
 
 
 def _angles(turn: NDArray[np.float64]) -> list[float]:
-    """The angles (radians) of x, y, z of a rotation (3, 3) that is Rx Ry Rz; that of z is 0 where only their sum is told."""
+    """The angles (radians) around x, y, z of a rotation (3, 3) = Rx Ry Rz; z is 0 if only the sum of two angles is
+    determined.
+    """
     (a, b, c), (_, e, f), (_, h, i) = turn.tolist()
     y = math.asin(max(-1.0, min(1.0, c)))
     if math.hypot(a, b) < 1e-9:
@@ -156,7 +158,7 @@ def _angles(turn: NDArray[np.float64]) -> list[float]:
 
 
 def _within(o: ObjectAnnotation) -> NDArray[np.bool_] | None:
-    """The part of an object's mask in its box; None for one without a mask."""
+    """The part of an object's mask in its box; None for an object without a mask."""
     assert o.box2d is not None
     (x0, y0), (x1, y1) = map(math.floor, o.box2d[:2]), map(math.ceil, o.box2d[2:])
     mask = o.mask

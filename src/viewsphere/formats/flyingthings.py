@@ -63,7 +63,7 @@ OPENGL = (1.0, -1.0, -1.0, 1.0)
 
 
 class Options(Frozen):
-    """The choice of the set, of three, whose folders the export writes."""
+    """The choice among the three sets whose folders the export can write."""
 
     set: Literal["flyingthings3d", "monkaa", "driving"] = Field(
         default="flyingthings3d", description="`flyingthings3d`: TRAIN and TEST; `monkaa`, `driving`: no splits"
@@ -71,7 +71,7 @@ class Options(Frozen):
 
 
 def refuses(scope: Scope, options: Options) -> Iterator[str]:
-    """Still pictures, and what is no stereo pair."""
+    """Reasons to refuse: still pictures, and rigs other than a stereo pair."""
     yield from refusals.sequences(scope)
     yield from refusals.stereo(scope)
     yield from two_eyes(scope)
@@ -111,7 +111,7 @@ class FlyingThings(Tree):
         return f"{round(lens.fx * SENSOR_MM / lens.width)}mm_focallength/scene_forwards/{scene(sample)}"
 
     def _kept(self, sample: Sample, folder: str, name: str) -> Iterator[File]:
-        """Maps of channels that happen to be there."""
+        """Maps of the optional channels that the data set keeps."""
         if "disparity_change" in sample.channels:
             change = map_pfm(sample, "disparity_change", float(UNKNOWN))
             yield File(f"disparity_change/{folder}/into_future/{name}.pfm", change)
@@ -122,7 +122,7 @@ class FlyingThings(Tree):
             yield File(f"motion_boundaries/{folder}/into_future/{name}.pgm", grey)
 
     def _cameras(self, sample: Sample, folder: str) -> Iterator[Piece]:
-        """The frame's block of both eyes, and its lens."""
+        """The frame's block with both eyes' matrices, and the frame's lens."""
         camera, baseline = sample.camera, self._eyes.pair(sample).baseline
         eyes = (rigid(camera.R.T, camera.center + camera.R[0] * x) * OPENGL for x in (0.0, baseline))
         rows = (f"{name} {' '.join(map(str, eye.ravel().tolist()))}\n" for name, eye in zip("LR", eyes, strict=True))

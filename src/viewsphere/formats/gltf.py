@@ -43,11 +43,11 @@ from viewsphere.store import Dataset
 TABLE = "frames.csv"
 FOLDER_SIZE = 10_000
 MESHES = 64
-"""Models that are kept in memory."""
+"""Number of models to keep in memory."""
 
 
 def refuses(scope: Scope) -> Iterator[str]:
-    """Pictures of which none has a known camera."""
+    """Reasons to refuse: no picture has a known camera."""
     yield from any_camera(scope)
 
 
@@ -68,7 +68,7 @@ def writer(dataset: Dataset, folder: Path, note: Callable[[str], None]) -> Gener
 
 
 def verify(dataset: Dataset, folder: Path, sampled: Collection[int]) -> Iterator[Remark]:
-    """Scenes and rows that are not as they would be exported now."""
+    """Yield scenes and rows that differ from the current export."""
     with temporary("cameras") as scratch_folder:
         scenes = _Scenes(dataset, scratch_folder)
         rows = [_HEAD, *(_row(sample, scenes.add(sample)) for sample in dataset)]
@@ -91,8 +91,8 @@ def _row(sample: Sample, name: str) -> str:
 
 @dataclass(eq=False)
 class _Scenes:
-    """The files of scenes, by what is in them, and which sample was the first there, counted from 0; cameras are kept in a
-    folder aside.
+    """The files of scenes by their contents, with the number of each scene's first sample, from 0. Cameras wait in a separate
+    folder.
     """
 
     dataset: Dataset
@@ -122,7 +122,7 @@ class _Scenes:
         return name
 
     def files(self) -> Iterator[tuple[int, str, bytes]]:
-        """The first frame of each scene, the scene's file, and what is in it."""
+        """The first frame of each scene, the scene's file, and its contents."""
         for name, first in self._files.values():
             sample, kept = self.dataset[first], self.scratch_folder / str(first)
             lines = read_text(kept).splitlines() if kept.is_file() else []
@@ -142,12 +142,12 @@ class _Scenes:
 
 
 def _known(sample: Sample) -> list[ObjectAnnotation]:
-    """The objects whose places and models are known."""
+    """The objects with known positions and models."""
     return [o for o in sample.objects if o.is_placed and o.model and o.source is None]
 
 
 def _looking(sample: Sample) -> Looking | None:
-    """A sample's camera, None where it is not known, or is a LiDAR."""
+    """A sample's camera; None if it is unknown or a LiDAR."""
     camera = sample.known_camera
     if camera is None or camera.lens.is_scan:
         return None
@@ -176,7 +176,7 @@ FORMAT = FormatSpec(
     holds=("scenes as meshes", "poses", "cameras"),
     read_by=("Blender", "trimesh", "any glTF viewer"),
     channels=(),
-    keeps_all_objects=True,  # what is hidden is part of a scene, too
+    keeps_all_objects=True,  # hidden objects are part of a scene, too
     names_credits=False,
     refuses=refuses,
     writer=writer,

@@ -46,9 +46,9 @@ from viewsphere.plugins.format import FormatSpec
 from viewsphere.store import Dataset
 
 NOTHING = np.float32(1e10)
-"""The depth that Blender gives to pixels that see nothing."""
+"""Blender's depth for pixels that see nothing."""
 LIBRARIES = ("v108", "v110")
-"""The oldest HDF5 that has to read the files, and the newest whose layout they may have."""
+"""The oldest HDF5 version that must read the files, and the newest version whose layout they may use."""
 
 Key = Literal[
     "colors", "depth", "distance", "normals", "nocs", "forward_flow", "backward_flow", "forward_flow_state",
@@ -72,7 +72,7 @@ class Options(Frozen):
 
 
 def check() -> None:
-    """Raise MissingExtraError where there is no h5py."""
+    """Raise MissingExtraError if h5py is missing."""
     _library()
 
 
@@ -82,13 +82,13 @@ def needs(options: Options) -> tuple[str, ...]:
 
 
 def refuses(scope: Scope, options: Options) -> Iterator[str]:
-    """Flow of still pictures."""
+    """Reasons to refuse: flow of still pictures."""
     if any("flow" in key for key in options.keys):
         yield from sequences(scope)
 
 
 class Hdf5(Tree):
-    """The tree of these keys."""
+    """The tree of files with these keys."""
 
     def __init__(self, dataset: Dataset, options: Options) -> None:
         super().__init__(dataset)
@@ -97,7 +97,7 @@ class Hdf5(Tree):
         self._types = {key: np.min_scalar_type(most.get(key, dataset.max_objects)) for key in SOURCES if "segmaps" in key}
 
     def of(self, sample: Sample) -> Iterator[File | Piece]:
-        """A container."""
+        """The container of a sample."""
         folder = self.stem(sample).rpartition("/")[0]
         yield File(f"{folder}/{sample.index}.hdf5", Coded(sample.index, f"{self._keys}.hdf5", lambda: self._container(sample)))
 
@@ -113,7 +113,7 @@ class Hdf5(Tree):
         return file.getvalue()
 
     def _array(self, sample: Sample, key: str) -> NDArray[Any] | None:
-        """Return the array of a key; None where the sample lacks it."""
+        """Return the array of a key; None if the sample lacks it."""
         if key == "colors":
             return sample.picture
         if SOURCES[key] not in sample.channels:
@@ -127,7 +127,7 @@ def _filled(metres: NDArray[np.float32]) -> NDArray[np.float32]:
 
 
 def _normals(normals: NDArray[np.float32]) -> NDArray[np.float32]:
-    """As colours, of axes that are turned from OpenCV's to OpenGL's."""
+    """Normals as colours, with axes turned from OpenCV's to OpenGL's."""
     return normals * np.array([0.5, -0.5, -0.5], np.float32) + np.float32(0.5)
 
 
@@ -170,7 +170,7 @@ def _camera(sample: Sample) -> dict[str, Any]:
 
 
 def _library() -> Any:
-    """The package h5py; raises MissingExtraError where there is none."""
+    """The package h5py; raises MissingExtraError if it is missing."""
     try:
         import h5py
     except ImportError:

@@ -41,7 +41,7 @@ KINDS = (".png", ".jpg", ".webp")
 CARD = "README.md"
 UNFIT = re.compile(r'[<>:"/\\|?*\[\]%\x00-\x1f\x7f]|^[. _]|[. _]$')
 LONGEST = 255
-"""Bytes of a folder's name."""
+"""Largest number of bytes in a folder's name."""
 
 
 class Options(Frozen):
@@ -53,7 +53,7 @@ class Options(Frozen):
 
 
 def refuses(scope: Scope, options: Options) -> Iterator[str]:
-    """Categories that folders cannot tell apart, and splits that `datasets` cannot."""
+    """Reasons to refuse: categories whose folders would coincide, and splits that `datasets` cannot distinguish."""
     names = [_folder(category.name) for category in scope.categories] if options.by == "category" else []
     for name in names:
         if not name or len(name.encode()) > LONGEST:
@@ -71,7 +71,7 @@ class ImageFolder(Tree):
         self._by = options.by
 
     def of(self, sample: Sample) -> Iterator[File | Piece]:
-        """A picture, and its line; nothing of a picture without objects."""
+        """A picture and its line; nothing for a picture without objects."""
         seen = [o for o in sample.objects if o.area]
         if not seen:
             return
@@ -98,7 +98,7 @@ class ImageFolder(Tree):
 
 
 def _folder(name: str) -> str:
-    """The name of a class's folder; no two classes have one."""
+    """The name of a class's folder, different for each class."""
     return UNFIT.sub(lambda match: f"%{ord(match[0]):02X}", name)
 
 

@@ -37,7 +37,7 @@ CAMERAS = {"left": "image_02", "right": "image_03"}
 
 
 def refuses(scope: Scope) -> Iterator[str]:
-    """Still pictures, rigs of several cameras that are no pair, lenses that bend."""
+    """Reasons to refuse: still pictures, rigs of several cameras other than a pair, and distorted lenses."""
     yield from refusals.sequences(scope)
     yield from two_eyes(scope)
     yield from refusals.pinhole(scope)
@@ -52,7 +52,7 @@ class KittiDepth(Tree):
         self._eyes = Eyes(dataset)
 
     def of(self, sample: Sample) -> Iterator[File]:
-        """A picture, its depth, and the lenses of the first."""
+        """A picture, its depth and, with a sequence's first picture, the lenses."""
         root, side = sample.split if sample.split in ("val", "test") else "train", self._eyes.side(sample)
         folder, camera = f"{root}/{scene(sample)}", CAMERAS[side]
         name = number(sample.instant, instants(self.dataset, sample), 10)

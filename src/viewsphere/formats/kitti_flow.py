@@ -69,7 +69,7 @@ def needs(options: Options) -> tuple[str, ...]:
 
 
 def refuses(scope: Scope, options: Options) -> Iterator[str]:
-    """Still pictures, what is no stereo pair, and more objects than 8 bits number."""
+    """Reasons to refuse: still pictures, rigs other than a stereo pair, and more objects than 8 bits can number."""
     yield from refusals.sequences(scope)
     yield from refusals.stereo(scope)
     yield from two_eyes(scope)
@@ -135,7 +135,7 @@ def _disparity(sample: Sample, states: tuple[int, ...]) -> bytes:
 
 
 def _later(sample: Sample, inside: bool) -> bytes:
-    """The seen points' disparity an instant later; `inside`: only where both pictures then have the point."""
+    """The disparity of the visible points one instant later; `inside`: only for points inside both pictures then."""
     later = sample.channels["disparity"] + sample.channels["disparity_change"]
     valid = np.isin(sample.channels["flow_state"], MATCHED["occ"]) & (sample.channels["disparity"] > 0) & (later > 0)
     return steps_png(later, valid & _in_both(sample, later) if inside else valid)

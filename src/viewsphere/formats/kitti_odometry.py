@@ -48,7 +48,7 @@ from viewsphere.store import Dataset
 
 
 def refuses(scope: Scope) -> Iterator[str]:
-    """Still pictures, lenses, and other cars than KITTI's."""
+    """Reasons to refuse: still pictures, distorted lenses, and rigs unlike KITTI's car."""
     yield from sequences(scope)
     yield from unknown_shots(scope)
     yield from pinhole(scope)

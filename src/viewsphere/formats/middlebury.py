@@ -74,7 +74,7 @@ class Middlebury(Tree):
         self._eyes, self._is_eth3d = Eyes(dataset), options.set == "eth3d"
 
     def of(self, sample: Sample) -> Iterator[File]:
-        """An eye's picture and disparity, and what is of the pair with the left one's."""
+        """An eye's picture and disparity; the left eye also gives the files of the pair."""
         eye, pictures, truth = ("left", "right").index(self._eyes.side(sample)), *self._folders(sample)
         yield File(f"{pictures}/im{eye}.png", picture(sample, ".png"))
         if not eye or not self._is_eth3d:
@@ -111,7 +111,7 @@ def _calibration(sample: Sample, baseline: float) -> bytes:
 
 
 def _colmap(sample: Sample, baseline: float, folder: str) -> Iterator[File]:
-    """Both eyes as COLMAP's text files have them."""
+    """Both eyes in COLMAP's text format."""
     camera, lens = sample.camera, sample.camera.intrinsics
     size = f"{lens.width} {lens.height}"
     lines = (f"{i} PINHOLE {size} {lens.fx!r} {lens.fy!r} {lens.cx!r} {lens.cy!r}\n" for i in (0, 1))

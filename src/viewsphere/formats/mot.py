@@ -64,7 +64,7 @@ class Mot(Tree):
         self._labels = "".join(f"{category.name}\n" for category in dataset.categories)
 
     def of(self, sample: Sample) -> Iterator[File | Piece]:
-        """A picture, its lines, and what the whole sequence is."""
+        """A picture, its lines, and the description of its sequence."""
         name = sample.sequence if sample.sensor == CAMERA else f"{sample.sequence}-{sample.sensor}"
         folder, suffix = f"{sample.split or 'all'}/{name}", suffix_of(sample, *KINDS)
         yield File(f"{folder}/img1/{sample.instant + 1:06d}{suffix}", picture(sample, *KINDS))
@@ -99,7 +99,7 @@ class Mot(Tree):
 
 
 def _columns(sample: Sample, o: ObjectAnnotation, x0: float, y0: float, x1: float, y1: float) -> tuple[int | str, ...]:
-    """A line's values; of a box (half-open corners) with origin 0."""
+    """A line's values for a box (half-open corners) with origin 0."""
     box = (f"{value:.10g}" for value in (x0 + 1, y0 + 1, x1 - x0, y1 - y0))
     return (sample.instant + 1, o.id, *box, 1, o.category_id, f"{o.visibility:.10g}")
 

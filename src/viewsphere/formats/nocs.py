@@ -51,14 +51,14 @@ from viewsphere.store import Dataset, ModelInfo
 
 BACKGROUND = 255
 SCENE_SIZE = 1000
-"""Still pictures of a scene."""
+"""Number of still pictures in a scene."""
 MILLIMETRE = 0.001
 Y_UP = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
-"""From the axes of objects (x left, y back, z up) to those of NOCS (x left, y up, z to the front)."""
+"""The rotation from the axes of objects (x left, y back, z up) to NOCS' axes (x left, y up, z to the front)."""
 
 
 def refuses(scope: Scope) -> Iterator[str]:
-    """Cameras that nobody knows, and more objects than the mask has numbers for."""
+    """Reasons to refuse: unknown cameras, and more objects than the mask can number."""
     yield from known_cameras(scope)
     yield from most_objects(scope, BACKGROUND - 1)
 
@@ -80,7 +80,7 @@ class Nocs(Tree):
         yield File(f"gts/real_{split}/results_real_{split}_{scene}_{number:04d}.pkl", _portable(_poses(sample)))
 
     def rest(self) -> Iterator[File]:
-        """Meshes and extents, which loaders look for in every split."""
+        """Meshes and extents, which loaders expect in every split."""
         for info in self.dataset.models:
             mesh, extents = _mesh(self.dataset, info), " ".join(map(repr, map(float, info.size)))
             for split in self.dataset.splits or ("all",):
@@ -101,7 +101,7 @@ def _mask(sample: Sample) -> NDArray[np.uint8]:
 
 
 def _coord(sample: Sample) -> NDArray[np.uint8]:
-    """Places as colours (H, W, 3)."""
+    """Positions in the objects' boxes as colours (H, W, 3)."""
     shares = sample.channels["nocs"].astype(np.float64)
     x, y, z = np.moveaxis(transform(Y_UP, shares - 0.5) + 0.5, -1, 0)
     colors = np.rint(np.clip(np.stack([x, y, 1 - z], axis=-1), 0, 1) * 255)
@@ -109,7 +109,7 @@ def _coord(sample: Sample) -> NDArray[np.uint8]:
 
 
 def _meta(sample: Sample) -> str:
-    """A line for each id up to the last one that is known, or in the mask: loaders find an object's line by its id."""
+    """A line for each id up to the last one known or in the mask, because loaders find an object's line by its id."""
     known = {o.id: (o.category_id, o.key) for o in sample.objects}
     most = max([*known, int(sample.channels["instances"].max(initial=0))])
     distractor = (0, next((key for _, key in known.values()), ""))
@@ -137,10 +137,12 @@ def _poses(sample: Sample) -> dict[str, Any]:
 
 
 class _Portable(pickle.Pickler):
-    """Pickles arrays so that any NumPy reads them: its own way names modules that its second version moved."""
+    """A pickler of arrays that any NumPy reads: NumPy's own pickles name modules that version 2 moved."""
 
     def reducer_override(self, obj: Any) -> Any:
-        """An array by what `numpy.array` makes it of, and its shape, which an empty one would lose."""
+        """Return the call that restores an array from its values and its shape; empty arrays would lose their shape
+        otherwise.
+        """
         if isinstance(obj, np.ndarray):
             return np.reshape, (obj.ravel().tolist(), obj.shape)
         return NotImplemented
@@ -153,7 +155,7 @@ def _portable(value: Any) -> bytes:
 
 
 def _mesh(dataset: Dataset, info: ModelInfo) -> bytes:
-    """An OBJ of triangles alone."""
+    """An OBJ file with only triangles."""
     mesh, middle = dataset.mesh(info.key), info.box3d_object.mean(axis=0)
     corners = transform(Y_UP, mesh.vertices - middle)
     points = "v %.7g %.7g %.7g\n" * len(corners) % tuple(corners.ravel().tolist())

@@ -50,7 +50,7 @@ from viewsphere.store import Dataset
 AXIS, FLATTENING = 6378137.0, 1 / 298.257223563
 OVAL = FLATTENING * (2 - FLATTENING)
 STEPS = 8
-"""Of the search for a latitude, each of which leaves less than a hundredth of the error."""
+"""Steps of the search for a latitude, each of which leaves less than a hundredth of the error."""
 
 
 Float = NDArray[np.float64]
@@ -76,7 +76,7 @@ class Options(Frozen):
 
 
 def refuses(scope: Scope, options: Options) -> Iterator[str]:
-    """Cameras that Bundler has not."""
+    """Reasons to refuse: cameras that Bundler cannot express."""
     yield from known_views(scope)
     yield from pinhole(scope)
     for name, lens in lenses(scope):
@@ -98,7 +98,7 @@ class Nyc3dCars(Tree):
         self._earth_from_world[:3, 3] = _earth(*at, options.altitude)
 
     def of(self, sample: Sample) -> Iterator[File | Piece]:
-        """A picture, its row and those of its vehicles."""
+        """A picture, its row and the rows of its vehicles."""
         name = f"{self.stem(sample)}.jpg"
         yield File(f"images/{name}", picture(sample, ".jpg"))
         yield _row("photos.csv", self._photo(sample, name))
@@ -107,7 +107,7 @@ class Nyc3dCars(Tree):
                 yield _row("vehicles.csv", [self.dataset.plan.annotation_id(sample.index, o.id), *self._vehicle(sample, o)])
 
     def layout(self, path: str, counts: Mapping[str, int]) -> Layout:
-        """A head, then the rows."""
+        """A header, then the rows."""
         return (_line(HEADS[path].split()), "")
 
     def rest(self) -> Iterator[File]:
@@ -175,13 +175,13 @@ FORMAT = FormatSpec(
 
 
 def _compass(latitude: float, longitude: float) -> Float:
-    """The directions east, north and up at a place (radians), the columns of (3, 3)."""
+    """The directions east, north and up at a position (radians), as columns of (3, 3)."""
     (s, c), (sl, cl) = (math.sin(latitude), math.cos(latitude)), (math.sin(longitude), math.cos(longitude))
     return np.array([[-sl, -s * cl, c * cl], [cl, -s * sl, c * sl], [0.0, c, s]])
 
 
 def _earth(latitude: float, longitude: float, altitude: float) -> Float:
-    """Earth-centred metres (3,) of a place (radians, metres)."""
+    """Earth-centred metres (3,) of a position (radians, metres)."""
     across = AXIS / math.sqrt(1 - OVAL * math.sin(latitude) ** 2)
     flat = (across + altitude) * math.cos(latitude)
     return np.array(

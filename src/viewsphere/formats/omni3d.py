@@ -44,16 +44,16 @@ from viewsphere.plugins.format import FormatSpec
 KINDS = (".png", ".jpg")
 NAME = "viewsphere"
 DATASET = 1000
-"""Number of the data set, where Omni3D's own have small ones."""
+"""Number of the data set; Omni3D's own data sets have small numbers."""
 UNKNOWN = [-1.0, -1.0, -1.0, -1.0]
 OBJECT_FROM_BOX = np.array([[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])
-"""From Omni3D's axes of a box (x front, y down, z left) to those of objects (x left, y back, z up)."""
+"""The rotation from Omni3D's axes of a box (x front, y down, z left) to viewsphere's object axes (x left, y back, z up)."""
 CORNERS = np.array([(-1, -1, -1), (1, -1, -1), (1, 1, -1), (-1, 1, -1), (-1, -1, 1), (1, -1, 1), (1, 1, 1), (-1, 1, 1)]) / 2
 """A box's corners in its own axes, in Omni3D's order, as shares of length, height and width."""
 
 
 def refuses(scope: Scope) -> Iterator[str]:
-    """Cameras that nobody knows, and distorted lenses."""
+    """Reasons to refuse: unknown cameras, and distorted lenses."""
     yield from known_cameras(scope)
     yield from pinhole(scope)
 
@@ -74,7 +74,7 @@ class Omni3d(Tree):
             yield item(table, ids | _annotation(sample, o), "annotations")
 
     def layout(self, path: str, counts: Mapping[str, int]) -> Layout:
-        """A JSON object of the two lists and what the whole data set says."""
+        """A JSON object with the two lists and the data of the whole data set."""
         split = path.removesuffix(".json").partition(f"{NAME}_")[2]
         info = {"id": DATASET, "source": NAME, "name": f"{NAME} {split}", "split": split, "version": "0.1", "url": ""}
         own = [{"id": c.id, "name": c.name, "supercategory": c.supercategory} for c in self.dataset.categories]
@@ -111,12 +111,12 @@ def _annotation(sample: Sample, o: ObjectAnnotation) -> dict[str, Any]:
 
 
 def _share(value: float) -> float:
-    """A share; -1 where nobody knows it."""
+    """A share; -1 if it is unknown."""
     return -1 if math.isnan(value) else value
 
 
 def _box(sample: Sample, o: ObjectAnnotation) -> dict[str, Any]:
-    """The box in 3D, and as the camera sees it."""
+    """The box in 3D, and its 2D boxes in the picture."""
     width, height, length = o.size
     rotation = product(o.camera_from_object[:3, :3], OBJECT_FROM_BOX)
     center = o.box3d_camera.mean(axis=0)

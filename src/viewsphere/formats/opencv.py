@@ -41,7 +41,7 @@ Value = int | str | NDArray[np.float64]
 
 
 def refuses(scope: Scope) -> Iterator[str]:
-    """Cameras that nobody knows, skew, and lenses that OpenCV does not have."""
+    """Reasons to refuse: unknown cameras, skew, and lenses that OpenCV lacks."""
     yield from known_cameras(scope)
     yield from no_skew(scope)
     yield from opencv_lenses(scope)
@@ -75,7 +75,7 @@ class Opencv(Tree):
 
 
 def _pairs(rig: Rig, cameras: list[Sensor]) -> Iterator[tuple[Sensor, Sensor, float]]:
-    """Rectified pairs of cameras with their baselines, and others of the first camera, of which that is 0."""
+    """Rectified pairs of cameras with their baselines, and the first camera's other pairs, with baseline 0."""
     rectified = [(rig.sensors[left], rig.sensors[right], baseline) for left, right, baseline in rig.rectified]
     rectified = [pair for pair in rectified if pair[0].lidar is None and pair[1].lidar is None]
     yield from rectified
@@ -86,12 +86,12 @@ def _pairs(rig: Rig, cameras: list[Sensor]) -> Iterator[tuple[Sensor, Sensor, fl
 
 
 def _matrix(lens: Intrinsics) -> NDArray[np.float64]:
-    """K (3, 3), pixels from the middle of the first."""
+    """K (3, 3), pixels from the centre of the first pixel."""
     return np.array([[lens.fx, 0.0, lens.cx - 0.5], [0.0, lens.fy, lens.cy - 0.5], [0.0, 0.0, 1.0]])
 
 
 def _bent(lens: Intrinsics) -> NDArray[np.float64]:
-    """The coefficients, (1, N)."""
+    """The distortion coefficients, (1, N)."""
     own = lens.lens.opencv
     return np.array([own.coefficients if own and own.coefficients else [0.0] * 5])
 
@@ -107,7 +107,7 @@ def _lens(lens: Intrinsics) -> dict[str, Value]:
 
 
 def _stereo(left: Sensor, right: Sensor, baseline: float) -> dict[str, Value]:
-    """A pair's lenses, and how the second camera is mounted to the first; all that rectified ones have besides."""
+    """A pair's lenses, the mount of the second camera relative to the first, and the additional keys of rectified pairs."""
     one, other = np.array(left.rig_from_sensor), np.array(right.rig_from_sensor)
     R = product(other[:3, :3].T, one[:3, :3])
     T = transform(other[:3, :3].T, one[:3, 3] - other[:3, 3])
@@ -125,7 +125,7 @@ def _stereo(left: Sensor, right: Sensor, baseline: float) -> dict[str, Value]:
 
 
 def _yaml(values: dict[str, Value]) -> bytes:
-    """A file as FileStorage has it."""
+    """A file in FileStorage's YAML."""
     text = ["%YAML:1.0", "---"]
     for name, value in values.items():
         if isinstance(value, int | str):

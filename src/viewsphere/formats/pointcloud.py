@@ -51,7 +51,7 @@ class Options(Frozen):
 
 
 def needs(options: Options) -> tuple[str, ...]:
-    """Channels that these options ask for."""
+    """The channels that these options require."""
     return ("surface_samples",) if options.surface == "complete" else ()
 
 
@@ -61,7 +61,7 @@ def refuses(scope: Scope, options: Options) -> Iterator[str]:
 
 
 def preparer(dataset: Dataset, folder: Path, options: Options) -> Callable[[Sample], None]:
-    """Writes a sample's cloud."""
+    """Write a sample's cloud."""
 
     def prepare(sample: Sample) -> None:
         if sample.known_camera is not None:
@@ -74,7 +74,7 @@ def preparer(dataset: Dataset, folder: Path, options: Options) -> Callable[[Samp
 
 @contextmanager
 def writer(dataset: Dataset, folder: Path, note: Callable[[str], None], options: Options) -> Generator[Callable[[None], None]]:
-    """Nothing is left to write but clouds."""
+    """A writer that adds nothing: the clouds are the whole export."""
     for name in missing(needs(options), dataset.plan.channels):
         raise UserError(
             f"pointcloud: expected a data set with the channel {name}, of which complete clouds are made; found none"
@@ -83,7 +83,7 @@ def writer(dataset: Dataset, folder: Path, note: Callable[[str], None], options:
 
 
 def verify(dataset: Dataset, folder: Path, sampled: Collection[int], options: Options) -> Iterator[Remark]:
-    """Clouds that are not as they would be exported now."""
+    """Yield clouds that differ from the current export."""
     names = [_name(dataset, sample) for sample in dataset if sample.known_camera is not None]
     yield from check_files(dataset, folder, (), (), names)
     for sample in dataset:

@@ -51,7 +51,7 @@ SYNSETS = {
 
 
 def refuses(scope: Scope) -> Iterator[str]:
-    """Pictures from nobody knows where, and names that the format cannot tell apart."""
+    """Reasons to refuse: unknown viewpoints, and names that the format cannot distinguish."""
     yield from known_views(scope)
     first = dict[str, str]()
     for category in scope.categories:
@@ -102,7 +102,7 @@ class RenderForCnn(Tree):
 
 
 def _rounded(view: ObjectView) -> ObjectView:
-    """The view to nine decimal places: the last digits differ between processors, and a name may hang on them."""
+    """The view to nine decimal places: the last digits differ between processors, and would change some names."""
     return ObjectView(*(round(value, 9) + 0.0 for value in vars(view).values()))
 
 
@@ -126,7 +126,7 @@ def _cut(sample: Sample, o: ObjectAnnotation) -> Coded:
 
 
 def _truncation(seen: tuple[float, ...], whole: tuple[float, ...]) -> Iterator[float]:
-    """The sides' distances, right and down, from those of the whole box, as shares of its size."""
+    """The offsets of the sides, right and down, from the sides of the whole box, as shares of its size."""
     width, height = whole[2] - whole[0], whole[3] - whole[1]
     for side, other, size in zip(seen, whole, (width, height, width, height), strict=True):
         yield float((side - other) / size) if size else 0.0

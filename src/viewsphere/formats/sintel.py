@@ -83,7 +83,7 @@ class Sintel(Tree):
         self._stereo, self._eyes = options.stereo, Eyes(dataset)
 
     def of(self, sample: Sample) -> Iterator[File]:
-        """A picture, and the labels of the left eye's."""
+        """A picture and, for the left eye, its labels."""
         count, side = instants(self.dataset, sample), self._eyes.side(sample)
         name = f"{scene(sample)}/frame_{number(sample.instant + 1, count)}"
         root = "test" if sample.split == "test" else "training"
@@ -130,7 +130,7 @@ def _ids(sample: Sample) -> bytes:
 
 
 def bytes_of(numbers: NDArray[np.int64], *shifts: int) -> NDArray[np.uint8]:
-    """Numbers (H, W) as pixels: their bytes from these bits on."""
+    """Numbers (H, W) as pixels: the bytes that start at these bits."""
     return np.stack([numbers >> shift & 255 for shift in shifts], axis=-1).astype(np.uint8)
 
 

@@ -57,7 +57,7 @@ THINGS = FURNITURE | {
     "ceiling": 1,
     "floor": 2,
     "wall": 3,
-    "interior": 3,  # of the zoo's rooms: walls, floor and ceiling are one thing
+    "interior": 3,  # for the zoo's rooms, whose walls, floor and ceiling are one object
     "window": 4,
     "chair": 6,
     "bed": 7,
@@ -89,7 +89,7 @@ STUFF = {
 
 
 def refuses(scope: Scope) -> Iterator[str]:
-    """Lenses that bend, and LiDARs, which have no picture."""
+    """Reasons to refuse: distorted lenses, and LiDARs, which have no picture."""
     yield from refusals.known_cameras(scope)
     yield from refusals.pinhole(scope)
     yield from refusals.no_skew(scope)
@@ -99,7 +99,7 @@ def refuses(scope: Scope) -> Iterator[str]:
 
 
 class Sscnet(Tree):
-    """The files of a data set."""
+    """The tree of a data set."""
 
     def __init__(self, dataset: Dataset) -> None:
         super().__init__(dataset)
@@ -118,7 +118,7 @@ class Sscnet(Tree):
         yield File(f"{name}.bin", Coded(sample.index, "sscnet.bin", cells))
 
     def notes(self) -> Iterator[str]:
-        """That SSCNet's own code expects another camera."""
+        """A note that SSCNet's own code expects another camera."""
         shot = next(iter(self.dataset.shots_of_parts), None)
         lens = shot and shot.rig.sensors[0].intrinsics
         if lens and lens != EXPECTED:
@@ -145,7 +145,7 @@ def _cells(sample: Sample, grid: Grid, classes: NDArray[np.uint8]) -> bytes:
 
 
 def _places(grid: Grid, camera: Camera) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """The grid's corner (3,), and the motion (4, 4) from the camera, in the world whose y the grid's first axis is."""
+    """The grid's corner (3,), and the motion (4, 4) from the camera, in the world whose y is the grid's first axis."""
     ahead, up, right, corner = grid.world_from_grid[:3].T
     turn, pose = np.stack((right, ahead, up)), np.eye(4)
     pose[:3, :3], pose[:3, 3] = product(turn, np.ascontiguousarray(camera.R.T)), transform(turn, camera.center)

@@ -129,7 +129,9 @@ def needs(options: Options) -> tuple[str, ...]:
 
 
 def refuses(scope: Scope, options: Options) -> Iterator[str]:
-    """Of sequences: stills, other rigs and lenses; names with spaces, and more categories than there are numbers."""
+    """Reasons to refuse: for sequences, still pictures and unsupported rigs and lenses; always, names with spaces and more
+    categories than numbers.
+    """
     yield from refusals.most_categories(scope, MOST)
     yield from refusals.plain_names(scope)
     if options.layout == "seqs":
@@ -183,7 +185,7 @@ class Synthia(Tree):
         yield Piece(f"{root}/CameraParams/intrinsics.txt", b"", f"{told}\n")
 
     def layout(self, path: str, counts: Mapping[str, int]) -> Layout:
-        """The lens of a sequence, which is the name of a section; else lines."""
+        """The lens of a sequence, which is the name of a section; otherwise lines."""
         if not path.endswith("intrinsics.txt"):
             return LINES
         if len(counts) > 1:
@@ -205,7 +207,7 @@ class Synthia(Tree):
 
 
 def _named(numbered: Numbered, classes: tuple[SemanticClass, ...], light: int) -> tuple[list[str], NDArray[np.uint8]]:
-    """Names and colours (N, 3) of all numbers; of categories that SYNTHIA lacks colours that it does not use."""
+    """Names and colours (N, 3) of all numbers; categories that SYNTHIA lacks get colours that it does not use."""
     known = {i: named for i, named in enumerate(COLORS.items())} | {light: ("TrafficLight", LIGHT)}
     own = {one.name: one.color for one in classes if one.is_thing}
     for number, name in numbered.own.items():

@@ -50,10 +50,10 @@ from viewsphere.plugins.format import FormatSpec
 from viewsphere.store import Dataset
 
 DATE = (1980, 1, 1, 0, 0, 0)
-"""Of all members of archives, so that equal arrays make equal files."""
+"""The date of all members of archives, fixed so that equal arrays make equal files."""
 
 UNIX = 3
-"""The system that all archives say they are of."""
+"""The system that all archives name as their origin."""
 
 
 class Options(Frozen):
@@ -65,14 +65,14 @@ class Options(Frozen):
 
 
 def refuses(scope: Scope, options: Options) -> Iterator[str]:
-    """Still pictures; of points in space, lenses that bend."""
+    """Reasons to refuse: still pictures and, for TAPVid-3D, distorted lenses."""
     yield from refusals.sequences(scope)
     if options.kind == "tapvid3d":
         yield from refusals.pinhole(scope)
 
 
 class Tapvid(Tree):
-    """A file a video."""
+    """A tree with a file for each video."""
 
     def __init__(self, dataset: Dataset, options: Options) -> None:
         super().__init__(dataset)
@@ -80,11 +80,11 @@ class Tapvid(Tree):
         self._make, self._ending = {"tapvid": (self._pickled, "pkl"), "tapvid3d": (self._archived, "npz")}[options.kind]
 
     def of(self, sample: Sample) -> Iterator[File]:
-        """Nothing: a file has a whole sequence."""
+        """Yield nothing, because a file holds a whole sequence."""
         yield from ()
 
     def rest(self) -> Iterator[File]:
-        """The videos, each made when it is written."""
+        """The videos, each encoded when it is written."""
         last = ""
         for key, places in self.dataset.shots():
             first = self.dataset.sample_at(key, places[0])
@@ -149,7 +149,7 @@ FORMAT = FormatSpec(
 
 
 class _Portable(pickle.Pickler):
-    """Pickles arrays by their shape, type and bytes: numpy's own way names modules that other versions of it do not have."""
+    """A pickler of arrays by shape, type and bytes: numpy's own pickles name modules that other versions lack."""
 
     def reducer_override(self, obj: Any) -> Any:
         """Return the call that restores an array; other values as usual."""

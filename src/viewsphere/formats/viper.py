@@ -108,7 +108,9 @@ UPWARD = np.diag([1.0, -1, -1])
 
 
 def refuses(scope: Scope) -> Iterator[str]:
-    """Still pictures; lenses that are more than an angle of view; more than there are numbers for."""
+    """Reasons to refuse: still pictures, lenses that need more than an angle of view, and more objects or categories than
+    numbers.
+    """
     yield from refusals.sequences(scope)
     yield from refusals.pinhole(scope)
     yield from refusals.centred(scope)
@@ -145,7 +147,7 @@ class Viper(Tree):
         yield Piece(f"{root}/camera/{sequence}.csv", f"{frame},{row}\n".encode())
 
     def rest(self) -> Iterator[File]:
-        """VIPER's classes, and those that it lacks."""
+        """VIPER's classes, and the data set's further classes."""
         text, colors = io.StringIO(newline=""), {one.name: one.color for one in self.dataset.classes if one.is_thing}
         rows = csv.writer(text, lineterminator="\n")
         for number, name in self._classes.own.items():
@@ -179,7 +181,7 @@ def _projection(camera: Camera) -> NDArray[np.float64]:
 
 
 def _view(first: Camera, now: Camera) -> NDArray[np.float64]:
-    """The motion (4, 4) from the axes of a camera to those of another, y up, z back."""
+    """The motion (4, 4) from one camera's axes to another's, y up, z back."""
     turned = product(now.R, np.ascontiguousarray(first.R.T))
     moved, matrix = now.t - transform(turned, first.t), np.eye(4)
     matrix[:3, :3], matrix[:3, 3] = product(product(UPWARD, turned), UPWARD), transform(UPWARD, moved)

@@ -48,7 +48,9 @@ class Options(Frozen):
 
 @dataclass(frozen=True)
 class Piece:
-    """The next bytes of a file of the export, and where they begin; `frame` they belong to, `what` they are."""
+    """The next bytes of a file of the export, and their offset; `frame`: the frame that they belong to; `what`: their
+    description.
+    """
 
     file: str
     begin: int
@@ -74,7 +76,7 @@ def writer(
 
 
 def verify(dataset: Dataset, folder: Path, sampled: Collection[int], options: Options) -> Iterator[Remark]:
-    """Yield every difference from the current export in bytes, by the files inside of shards."""
+    """Yield every difference from the current export in bytes, by the files inside the shards."""
     shards, sizes = _Shards(dataset, options), dict[str, int]()
     for piece in shards.all():
         sizes[piece.file] = piece.begin + len(piece.data)
@@ -94,7 +96,7 @@ def _found(file: Path, piece: Piece) -> bytes:
 
 @dataclass
 class _Split:
-    """The shards of a split: samples and bytes of those that are whole, and of the one that is written."""
+    """The shards of a split: samples and bytes of the complete shards, and of the current one."""
 
     name: str
     whole: list[tuple[int, int]] = field(default_factory=list[tuple[int, int]])
@@ -109,7 +111,7 @@ class _Split:
         return Piece(self.file(len(self.whole)), self.size - len(data), data, what, frame)
 
     def end(self) -> Iterator[Piece]:
-        """The end of the shard that is written, if there is one."""
+        """The end of the current shard, if there is one."""
         if self.samples:
             yield self.add(tar.ending(self.size), "its end")
             self.whole.append((self.samples, self.size))
@@ -126,7 +128,7 @@ class _Split:
 
 
 class _Shards:
-    """Turns samples into the bytes of the export's files."""
+    """The conversion of samples into the bytes of the export's files."""
 
     def __init__(self, dataset: Dataset, options: Options) -> None:
         self._dataset, self._options = dataset, options
@@ -139,7 +141,7 @@ class _Shards:
         yield from self.end()
 
     def add(self, sample: Sample) -> Iterator[Piece]:
-        """The bytes of a sample, and before them the end of the shard before it."""
+        """The bytes of a sample, preceded by the end of the previous shard if the sample starts a new one."""
         split = self._splits.setdefault(sample.split, _Split(sample.split))
         files = [(name, tar.member(name, data)) for name, data in self._files(sample)]
         size, most = sum(len(data) for _, data in files), self._options.bytes_per_shard

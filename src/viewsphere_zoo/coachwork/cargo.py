@@ -18,7 +18,7 @@ from viewsphere_zoo.townscape.surfaces import cuboid
 
 @dataclass(frozen=True)
 class Skin:
-    """Materials of the load's walls, of what is painted on them, and of its edges."""
+    """Materials of the load area's walls, of the livery painted on them, and of its edges."""
 
     wall: Material
     mark: Material
@@ -27,7 +27,7 @@ class Skin:
 
 
 def cargo_pieces(s: Frame, c: Coats, skin: Skin) -> list[Piece]:
-    """Return the pieces of the load area, by the parameters' kind."""
+    """Return the pieces of the load area, of the kind that the parameters name."""
     return {"box": _box, "cold_box": _cold, "curtain": _curtain, "dropside": _dropside, "tipper": _tipper}[s.p.load](s, c, skin)
 
 
@@ -136,7 +136,7 @@ def _curtain(s: Frame, c: Coats, skin: Skin) -> list[Piece]:
 
 
 def _bed(s: Frame, tall: float, skin: Skin, c: Coats) -> list[Piece]:
-    """A floor with boards of this height around it and a wall behind the cab."""
+    """A floor with boards of this height around it, and a wall behind the cab."""
     (a, b), half, z = s.bed, s.p.width / 2, s.floor
     floor = cuboid((-half, a, z - 0.12), (half, b, z + 0.02))
     t = 0.04
@@ -183,7 +183,7 @@ def _dropside(s: Frame, c: Coats, skin: Skin) -> list[Piece]:
 
 
 def _tipper(s: Frame, c: Coats, skin: Skin) -> list[Piece]:
-    """A tub with ribs, a guard over the cab, and a heap in it."""
+    """A ribbed tub with a heap in it, and a guard over the cab."""
     (a, b), half, z = s.bed, s.p.width / 2, s.floor
     tall, t = 1.15 if s.p.wheel_radius > 0.42 else 0.7, 0.06
     walls = [cuboid((x, a, z), (x + t, b, z + tall)) for x in (-half + 0.05, half - 0.05 - t)]

@@ -10,7 +10,7 @@ from viewsphere_zoo.shapes.paint import Color, lamp, linear, metal
 
 @dataclass(frozen=True)
 class Coats:
-    """Materials: paint, the roof's paint, lower cladding, rims, and those that all cars share."""
+    """Materials: paint, the roof's paint, lower cladding, rims, and the materials that all cars share."""
 
     paint: Material
     roof: Material

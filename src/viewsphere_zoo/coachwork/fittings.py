@@ -112,7 +112,7 @@ def mirrors(shape: Shape, coats: Coats, tall: bool) -> list[Piece]:
 
 
 def wipers(shape: Shape, coats: Coats) -> list[Piece]:
-    """A dark scuttle before the windshield and two blades on it."""
+    """A dark scuttle in front of the windshield, and two blades on the glass."""
     cabin, hull = shape.cabin, shape.hull
     u = np.linspace(-0.88, 0.88, 31)
     foot = cabin.base.point(u)
@@ -138,7 +138,7 @@ def roof_line(shape: Shape, x: float, y: Float, rise: float) -> Float:
 
 
 def rack(shape: Shape, coats: Coats, bars: bool) -> list[Piece]:
-    """Rails along the roof's sides and, if asked, two bars across."""
+    """Rails along the roof's sides and, on request, two bars across."""
     top = shape.cabin.top
     x = 0.8 * top.half_width
     span = top.rear - top.front

@@ -18,9 +18,9 @@ GLASS_DEPTH = 0.009
 
 @dataclass(frozen=True)
 class Cell:
-    """A stretch [start, stop] of the ring around the cabin; with a name it holds a pane.
+    """A stretch [start, stop] of the ring around the cabin. It holds a pane if it has a name.
 
-    margins: frame left, right, below, above the pane, metres; slant: how much higher the pane's lower right corner lies.
+    margins: frame left, right, below, above the pane, metres; slant: how much higher the pane's lower right corner is.
     """
 
     start: float
@@ -32,7 +32,7 @@ class Cell:
 
 @dataclass(frozen=True)
 class Greenhouse:
-    """The cabin above the belt, metres; roof (y, z) is the roof's line in side view, drop how much lower its edge lies."""
+    """The cabin above the belt, metres; roof (y, z) is the roof's line in side view; drop is how much lower its edge is."""
 
     hull: Hull
     base: Outline

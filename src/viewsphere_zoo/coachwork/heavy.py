@@ -14,11 +14,11 @@ from viewsphere_zoo.shapes.rods import ring_of
 from viewsphere_zoo.shapes.solids import Float, Solid, both_sides, grid, join, lathe, mirrored, moved, rounded_box, tube, turned
 
 GAP = 0.05
-"""Between the two tyres of a twin wheel, metres."""
+"""Gap between the two tyres of a twin wheel, metres."""
 
 
 Span = tuple[float, float]
-"""From where to where, in a surface's parameters."""
+"""Start and end, in a surface's parameters."""
 
 
 def sides(part: str, material: Material, solid: Solid) -> list[Piece]:
@@ -82,7 +82,7 @@ def roof(hull: Hull) -> Solid:
 
 
 def arm_mirror(root: Float, out: float, size: tuple[float, float], drop: float, coats: Coats, shell: Material) -> list[Piece]:
-    """A mirror of this width and height on a bent arm, `out` beside its root and hanging `drop` below it; both sides."""
+    """A mirror of this width and height on a bent arm, `out` beside its root and `drop` below it, on both sides."""
     x, y, z = root
     w, h = size
     middle = (x + out, y - 0.12, z - drop)
@@ -97,7 +97,7 @@ def arm_mirror(root: Float, out: float, size: tuple[float, float], drop: float, 
 
 
 def written(text: Solid, hull: Hull, z: float, height: float, rear: bool = False) -> Solid:
-    """Lettering laid on a hull's front or rear, its middle at this z."""
+    """Lettering laid on a hull's front or rear, with its middle at this z."""
     x, y, up = text.vertices.T
     u = hull.outline.u_at_x(-x if rear else x, rear)
     u = np.where(u < 0, u + 8, u) if rear else u
@@ -106,19 +106,19 @@ def written(text: Solid, hull: Hull, z: float, height: float, rear: bool = False
 
 
 def rectangle(surface: Surface, u: Span, z: Span, height: float, rounding: float = 0.06) -> Solid:
-    """A pane on a flank that is flat along it, between two u and two z, `height` above it."""
+    """A flat pane on a flank, between two u and two z, `height` above the flank."""
     return _pane(surface, u, z, height, rounding, 2)
 
 
 def bent(surface: Surface, u: Span, z: Span, height: float, rounding: float = 0.08) -> Solid:
-    """A pane that follows a curved front or rear, and around its corners."""
+    """A pane that follows a curved front or rear and its corners."""
     line = np.linspace(*u, 9)
     wide = np.linalg.norm(np.diff(surface(line, np.full(9, sum(z) / 2)), axis=0), axis=1).sum()
     return _pane(surface, u, z, height, rounding, max(3, int(np.ceil(wide / 0.09))))
 
 
 def _pane(surface: Surface, u: Span, z: Span, height: float, rounding: float, columns: int) -> Solid:
-    """A closed plate over a lattice; rounding: of its corners, as a share of its shorter side."""
+    """A closed plate over a lattice; rounding: radius of its corners, as a share of its shorter side."""
     ends = surface(np.array(u), np.full(2, sum(z) / 2))
     tall, wide = z[1] - z[0], max(float(np.linalg.norm(ends[1] - ends[0])), 1e-6)
     r = rounding * min(tall, wide)

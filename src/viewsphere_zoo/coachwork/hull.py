@@ -37,9 +37,9 @@ Knots = tuple[tuple[float, float], ...]
 class Hull:
     """A lower body, metres.
 
-    center (y, z): the deck's line in side view; crown: how much lower the deck's sides lie; sill: (y, z) of the wall's
-    lower edge; side, nose, tail: (z, inset from the outline) on flanks, front and rear; edge: radius between wall and
-    deck; bumper_line: z that parts bumpers from body; crease: z of the fold along the flanks; dome: height of a bonnet
+    center (y, z): the deck's line in side view; crown: how much lower the deck's sides are; sill: (y, z) of the wall's lower
+    edge; side, nose, tail: (z, inset from the outline) on flanks, front and rear; edge: radius between wall and deck;
+    bumper_line: z of the border between bumpers and body; crease: z of the fold along the flanks; dome: height of a bonnet
     bulge that ends at y = dome_end.
     """
 
@@ -107,7 +107,7 @@ class Hull:
         return at, z
 
     def wall(self) -> Float:
-        """The left wall's grid (stations, rows, 3), rows upwards; row LOWER lies on the bumper line."""
+        """The left wall's grid (stations, rows, 3), rows upwards; row LOWER is on the bumper line."""
         u = self.stations
         _, top = self.top(u)
         low, high = self.lower_edge(u), top - self.edge

@@ -52,7 +52,7 @@ def headlights(shape: Shape, style: Lamps, coats: Coats) -> list[Piece]:
 
 
 def taillights(shape: Shape, style: Lamps, coats: Coats) -> list[Piece]:
-    """Lamps on the rear corners; upright on vans, pickups and boxy bodies, else lying."""
+    """Lamps on the rear corners; upright on vans, pickups and boxy bodies, else horizontal."""
     hull = shape.bed if shape.body == "pickup" else shape.hull
     upright = shape.body in ("van", "pickup") or style in ("block", "round")
     half, surface = shape.width / 2, hull.surface
@@ -61,7 +61,7 @@ def taillights(shape: Shape, style: Lamps, coats: Coats) -> list[Piece]:
     inner = float(hull.outline.u_at_x((0.74 if upright else 0.5) * half, rear=True))
     top = hull.top(np.array([outer, inner]))[1] - hull.edge - 0.01
     tuck = 0.0 if upright else 0.25 * tall
-    proud = 0.006 if upright else 0.0  # of a corner that is nearly square
+    proud = 0.006 if upright else 0.0  # the width at a corner that is nearly square
     quad = np.array([[outer, top[0] - tall + tuck], [inner, top[1] - tall], [inner, top[1]], [outer, top[0]]])
     pieces = _pair("taillight", coats.black, panel(surface, quad, 0.004 + proud, 0.14, 6, rings=2, corner=2))
     red = _shrunk(quad, 0.04, 0.96, 0.34 if upright else 0.06, 0.96 if upright else 0.94)

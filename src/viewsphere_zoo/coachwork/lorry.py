@@ -1,4 +1,4 @@
-"""A lorry's cab and chassis; what it carries is in cargo.py."""
+"""A lorry's cab and chassis; the load areas are in cargo.py."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ class Frame:
 
     @property
     def bed(self) -> tuple[float, float]:
-        """First and last y of what is carried."""
+        """First and last y of the load area."""
         return self.cab_end + 0.22, self.p.length / 2
 
     @property
@@ -127,7 +127,7 @@ def _glass(s: Frame, c: Coats) -> list[Piece]:
 
 
 def _doors(s: Frame, c: Coats) -> list[Piece]:
-    """Side windows that fall towards the front, seams, handles, steps."""
+    """Side windows that slope down towards the front, seams, handles, steps."""
     hull, p = s.cab, s.p
     o, surface = hull.outline, hull.surface
     start = float(o.point(np.array(o.u_at_x(0.985 * o.half_width)))[1]) + 0.06
@@ -260,7 +260,7 @@ def _guard(radius: float, y: float, outside: float, width: float) -> Solid:
 
 
 def _flank(s: Frame, a: float, b: float, c: Coats) -> list[Piece]:
-    """Tank and battery box below the load, and the rails that keep people from under the wheels."""
+    """Tank and battery box below the load, and the side guards that keep people away from the wheels."""
     p, z = s.p, s.floor - 0.45
     length = min(1.3, 0.5 * (b - a))
     tank = rod((-p.width / 2 + 0.42, a + 0.1, z), (-p.width / 2 + 0.42, a + 0.1 + length, z), 0.29, 18)

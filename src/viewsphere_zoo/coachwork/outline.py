@@ -19,7 +19,7 @@ class Outline:
 
     u runs counter-clockwise seen from above: 0 middle of the front, 1 front left corner, 2 middle of the left side (+x),
     3 rear left corner, 4 middle of the rear; negative u is the right side. `cross` and `along` are the superellipse's
-    exponents (front, rear): the higher, the squarer; `bow` is how far the ends' corners lie behind their middles.
+    exponents (front, rear): higher values are squarer; `bow` is how far the ends' corners are behind their middles.
     """
 
     front: float

@@ -1,4 +1,4 @@
-"""A bus put together: one long hull, bands of windows, doors, and what is fitted to front, rear and roof."""
+"""A complete bus: one long hull, bands of windows, doors, and the fittings of front, rear and roof."""
 
 from __future__ import annotations
 
@@ -56,12 +56,12 @@ class Saloon:
 
     @property
     def plan(self) -> Layout:
-        """The places of its style."""
+        """The layout of its style."""
         return LAYOUTS[self.p.style]
 
     @cached_property
     def amber(self) -> Material:
-        """The material of the shining letters on its displays."""
+        """The material of the lit letters on its displays."""
         return lamp("destination", (1.0, 0.66, 0.1), 0.9)
 
     @cached_property
@@ -104,7 +104,7 @@ class Saloon:
 
     @cached_property
     def doors(self) -> tuple[tuple[float, float], ...]:
-        """(first y, last y) of the doors: before the front axle, between the axles, behind the rear one."""
+        """(first y, last y) of the doors: ahead of the front axle, between the axles, behind the rear axle."""
         front, rear = self.axles
         lead = self.flank[0]
         first = (lead, min(lead + 1.25, front - self.p.wheel_radius - 0.2))
@@ -151,7 +151,7 @@ def pieces(p: Bus, c: Coats) -> list[Piece]:
 
 
 def _windows(s: Saloon, c: Coats) -> list[Piece]:
-    """Panes in rows on both flanks, over a dark band if they are flush; the doors' side leaves room for them."""
+    """Panes in rows on both flanks, over a dark band if they are flush; the side with doors leaves room for them."""
     p = s.p
     found: list[Piece] = []
     for low, high in s.plan.bands:

@@ -1,4 +1,4 @@
-"""From a car's parameters to its hull, cabin and bed: the proportions of each body style."""
+"""The hull, cabin and bed of a car from its parameters, and the proportions of each body style."""
 
 from __future__ import annotations
 

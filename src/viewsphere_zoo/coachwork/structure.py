@@ -15,7 +15,9 @@ from viewsphere_zoo.shapes.solids import both_sides, flipped, grid, mirrored, mo
 
 
 def hull_pieces(hull: Hull, track: float, coats: Coats, bumpers: tuple[str, str]) -> list[Piece]:
-    """Walls, bumpers and sills, underside with wheel houses, their inner walls at x = track; bumpers names the lower ends."""
+    """Walls, bumpers and sills, underside with wheel houses, their inner walls at x = track; `bumpers` names the lower ends of
+    front and rear.
+    """
     wall = hull.wall()
     y = wall[:, 0, 1]
     arches = hull.arches
@@ -63,7 +65,7 @@ def cabin_pieces(shape: Shape, coats: Coats, cells: tuple[Cell, ...], black_pill
 
 
 def _cell_pieces(shape: Shape, cell: Cell, coats: Coats, material: Material, mirror: bool) -> list[Piece]:
-    """A cell's frame, seal and pane; on both sides if asked."""
+    """A cell's frame, seal and pane, on request on both sides."""
     name = cell.name
     if not cell.name:
         wall = shape.cabin.wall(cell)

@@ -57,7 +57,7 @@ def _path(pulleys: Sequence[Pulley]) -> Float:
 
 
 def phase_on(centres: Float, pulley: Pulley) -> float:
-    """The angle of a roller near the middle of the pulley's arc that the chain covers, radians from y to z."""
+    """The angle of a roller near the middle of the arc where the chain lies on the pulley, radians from y to z."""
     offset = centres - (pulley.y, pulley.z)
     near = np.flatnonzero(np.abs(np.linalg.norm(offset, axis=1) - pulley.radius) < 5e-4)
     middle = offset[near[len(near) // 2]] if len(near) else np.array((1.0, 0.0))

@@ -10,7 +10,7 @@ from viewsphere_zoo.shapes.paint import Color, Finish, coated, lamp, linear, met
 
 @dataclass(frozen=True)
 class Colors:
-    """Colours sRGB 0..1; parts: of cranks, stem, seat post and hubs; sidewall, grip: of the tyres and of the grips."""
+    """Colours sRGB 0..1; parts: cranks, stem, seat post and hubs; sidewall: of the tyres; grip: of the grips."""
 
     frame: Color = (0.7, 0.08, 0.1)
     accent: Color = (0.95, 0.95, 0.93)
@@ -27,7 +27,7 @@ class Colors:
 
 @dataclass(frozen=True)
 class Coats:
-    """The materials of these colours, and those that all bicycles share."""
+    """The materials of these colours, and the materials that all bicycles share."""
 
     frame: Material
     accent: Material

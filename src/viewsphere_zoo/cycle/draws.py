@@ -1,4 +1,4 @@
-"""Random bicycles as they are found on roads, by style and kind."""
+"""Random bicycles like real ones, by style and kind."""
 
 from __future__ import annotations
 
@@ -228,7 +228,7 @@ def _touring(rng: np.random.Generator) -> Bicycle:
 
 
 def _mountain(rng: np.random.Generator) -> Bicycle:
-    """Knobbly tyres and a wide bar; usually a suspension fork, often a shock; the oldest with small wheels and V-brakes."""
+    """Knobbly tyres and a wide bar; usually a suspension fork, often a shock. Old ones have small wheels and V-brakes."""
     return _old_mountain(rng) if _coin(rng, 0.25) else _new_mountain(rng)
 
 
@@ -301,7 +301,7 @@ def _new_mountain(rng: np.random.Generator) -> Bicycle:
 
 
 def _step_through(rng: np.random.Generator) -> Bicycle:
-    """For town: upright, with everything that keeps clothes clean and carries the shopping."""
+    """A town bicycle: upright, with guards that keep clothes clean and luggage for the shopping."""
     shape = _one(rng, ("swan", "swan", "wave", "mixte"))
     colors = _colors(rng, 0.15, 0.15, 0.0)
     rubber = _one(rng, (_BLACK, _BLACK, _BLACK, _CREAM, _BROWN))
@@ -365,7 +365,7 @@ def _town_geometry(rng: np.random.Generator, w: Wheel, beam: bool) -> Geometry:
 
 
 def _town_bar(rng: np.random.Generator, quill: bool, shifters: bool) -> Cockpit:
-    """A bar that comes back to the rider, or a riser."""
+    """A bar swept back to the rider, or a riser bar."""
     return Cockpit(
         "swept" if _coin(rng, 0.8) else "riser",
         _between(rng, 0.54, 0.62),

@@ -1,4 +1,4 @@
-"""The drive on the bicycle's right: chainrings, cassette, derailleurs, chain and its guard."""
+"""The drive train on the bicycle's right: chainrings, cassette, derailleurs, chain and its guard."""
 
 from __future__ import annotations
 
@@ -204,7 +204,9 @@ def _guard(at: Layout, g: Gears, coats: Coats) -> list[Piece]:
 
 
 def _belt(front: Pulley, rear: Pulley, full: bool) -> Float:
-    """The outline (N, 2) of a belt around both pulleys: all of it, or most of the upper run with the front pulley's arc."""
+    """The outline (N, 2) of a belt around both pulleys: the whole belt, or most of the upper run with the front pulley's
+    arc.
+    """
     y, z = rear.y - front.y, rear.z - front.z
     tilt, bend = np.arctan2(z, y), np.arcsin((front.radius - rear.radius) / np.hypot(y, z))
     start = tilt + np.pi / 2 - bend

@@ -14,7 +14,7 @@ from viewsphere_zoo.shapes.solids import Float, Solid
 class Geometry:
     """Frame geometry: lengths in metres, angles in degrees from the horizontal.
 
-    drop: how far the bottom bracket lies below the axles; fork_length: axle to crown; rake: the front axle's distance from
+    drop: how far the bottom bracket is below the axles; fork_length: axle to crown; rake: the front axle's distance from
     the steering axis; seat_tube: bottom bracket to the tube's top; saddle: bottom bracket to the saddle's top, along the
     seat tube; tube: thickness of the frame's tubes, 1 is steel and 1.6 a fat aluminium frame.
     """
@@ -34,7 +34,7 @@ class Geometry:
 
 @dataclass(frozen=True)
 class Layout:
-    """Points of a frame on wheels of this radius, (3,) metres, x = 0; steering straight ahead."""
+    """Points (3,) of a frame on wheels of this radius, metres, x = 0, steering straight ahead."""
 
     g: Geometry
     radius: float
@@ -62,7 +62,7 @@ class Layout:
 
     @property
     def ahead(self) -> Float:
-        """Unit vector square to the steering axis, towards the front."""
+        """Unit vector perpendicular to the steering axis, towards the front."""
         return np.cross((1.0, 0.0, 0.0), self.steering)
 
     @property

@@ -15,7 +15,7 @@ from viewsphere_zoo.shapes.solids import Float, Solid, both_sides, curve, join, 
 
 @dataclass(frozen=True)
 class Saddle:
-    """Metres. tilt: nose up, degrees; springs: two coils under its rear."""
+    """A saddle; lengths in metres. tilt: nose up, degrees; springs: two coils under its rear."""
 
     length: float = 0.275
     width: float = 0.145

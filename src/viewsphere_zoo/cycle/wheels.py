@@ -50,7 +50,7 @@ class Wheel:
 
 @dataclass(frozen=True)
 class Hub:
-    """Half the width between the dropouts, where the flanges are (left, right), and radii, metres."""
+    """Half the width between the dropouts, the positions of the flanges (left, right), and the radii, metres."""
 
     half: float = 0.05
     left: float = 0.034
@@ -60,7 +60,7 @@ class Hub:
 
 
 def on_axle(solid: Solid) -> Solid:
-    """The solid, turned so that its z axis lies on the axle along x."""
+    """The solid, turned so that its z axis is the axle along x."""
     return turned(solid, 1, np.pi / 2)
 
 
@@ -169,7 +169,7 @@ def _rim(w: Wheel, coats: Coats, name: str, phase: float) -> list[Piece]:
 
 
 def _spokes(w: Wheel, hub: Hub) -> tuple[Solid, Solid]:
-    """Crossed lacing: on each flange neighbours lean to opposite sides; and the nipples at the rim."""
+    """Crossed lacing: on each flange neighbours lean to opposite sides. Includes the nipples at the rim."""
     a, b = spoke_ends(w, hub)
     tips = a + (b - a) * (1 - 0.013 / np.linalg.norm(b - a, axis=1))[:, None]
     wires = [rod(p, q, w.spoke, 5) for p, q in zip(a, b, strict=True)]

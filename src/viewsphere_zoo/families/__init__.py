@@ -1,1 +1,1 @@
-"""The families of the zoo, one module a family, named as its file."""
+"""The families of the zoo: one module for each family, named like the family."""

@@ -42,8 +42,8 @@ Style = Literal["school", "hiking", "roll_top", "flap"]
 class Backpack:
     """Parameters of a backpack; metres, colours sRGB 0..1.
 
-    height, width, depth: of the bag without pockets; fill: 0 flat to 1 stuffed; pockets: in front, 1 or 2; bottle: in the side
-    pocket on its left; mat: a rolled mat below or on top; seed draws the folds.
+    height, width, depth: of the bag without pockets; fill: 0 flat to 1 stuffed; pockets: number in front, 1 or 2; bottle: in
+    the side pocket on its left; mat: a rolled mat below or on top; seed draws the folds.
     """
 
     style: Style = "school"

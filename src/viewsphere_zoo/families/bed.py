@@ -64,8 +64,9 @@ class Bed:
 
     width, length: of the mattress; rail: height of the top of the frame; mattress: its thickness; head: kind of headboard, and
     its height; foot: a footboard; posts: height of four posts with rails between them, 0 for none; duvet_hang: how far the
-    duvet hangs over the sides; folded: width of the band that is turned back; pillows: in one row, further ones lean on
-    them; cushions: small ones before them; throw: a blanket over the foot end; seed: of cloths, grain and folds.
+    duvet hangs over the sides; folded: width of the band that is turned back; pillows: their number, where those beyond one
+    row lean on the others; cushions: small ones before them; throw: a blanket over the foot end; seed: of cloths, grain and
+    folds.
     """
 
     width: float = 1.6
@@ -119,7 +120,7 @@ class _Coats:
 def bed(parameters: Bed | None = None) -> Mesh:
     """The bed in metres: its foot end at -Y, the headboard at +Y, legs on z = 0, the mattress centred.
 
-    Parts: leg, rail, headboard, mattress, duvet, duvet_fold, pillow; footboard, post, cushion, throw where there are.
+    Parts: leg, rail, headboard, mattress, duvet, duvet_fold, pillow; footboard, post, cushion and throw where fitted.
     """
     p = parameters or Bed()
     rng = np.random.default_rng(p.seed)
@@ -246,7 +247,7 @@ def _bedding(p: Bed, coats: _Coats, rng: np.random.Generator) -> list[Piece]:
     front = -y - (p.duvet_hang + 0.05 if p.foot == "none" else -0.01)
 
     def laid(low: float, high: float, half: float, under: float, thickness: float, spacing: float) -> Solid:
-        # Every cloth has the creases of what it lies on, else that would show through.
+        # Every cloth repeats the creases of the cloth below it; otherwise the lower one would show through.
         block_ = (-x - 0.04 - under, -y - 0.04 - under, x + 0.04 + under, 9.0)
         creases = np.random.default_rng(p.seed)
         return draped(creases, (-half, low, half, high), block_, top + under, thickness, 0.02, spacing, 0.05)
@@ -291,7 +292,7 @@ def surfaces(parameters: Bed) -> tuple[LevelFace, ...]:
 
 
 def bed_random(rng: np.random.Generator) -> Mesh:
-    """A bed with parameters drawn as they are found in bedrooms."""
+    """A bed with parameters drawn to resemble beds in real bedrooms."""
     return bed(draw(rng))
 
 

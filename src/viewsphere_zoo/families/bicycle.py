@@ -70,7 +70,7 @@ def bicycle(parameters: Bicycle | None = None) -> Mesh:
 
 
 def bicycle_random(rng: np.random.Generator) -> Mesh:
-    """A bicycle with parameters drawn as they are found on roads."""
+    """A bicycle with parameters drawn to resemble real bicycles."""
     return bicycle(draw(rng))
 
 
@@ -164,7 +164,7 @@ def _cable_entry(p: Bicycle, at: Layout) -> tuple[Float, Float]:
 
 
 def _fitted(p: Bicycle, at: Layout, room: Room, c: Coats) -> list[Piece]:
-    """Mudguard, luggage, lights and stand at the rear."""
+    """The rear's mudguard, luggage, lights and stand."""
     w, axle = p.wheel, at.rear_axle
     pieces: list[Piece] = []
     if p.guards != "none":

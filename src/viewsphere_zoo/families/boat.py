@@ -66,7 +66,7 @@ def _standing(pieces: Sequence[Piece]) -> Mesh:
 
 
 def boat_random(rng: np.random.Generator) -> Mesh:
-    """A boat with parameters drawn as they are found in a small harbour."""
+    """A boat with parameters drawn to resemble boats in a small harbour."""
     return boat(draw(rng))
 
 

@@ -23,8 +23,9 @@ Style = Literal["steel", "iron", "concrete", "guard"]
 
 @dataclass(frozen=True)
 class Bollard:
-    """Parameters of a bollard; metres, colours sRGB 0..1. bands: heights of reflecting bands as shares of the height; top: of
-    the post; plate: whether it is bolted down on a flange; sides: of the post, 0 round."""
+    """Parameters of a bollard; metres, colours sRGB 0..1. bands: heights of reflecting bands as shares of the height; top:
+    shape of the post's top; plate: whether it is bolted down on a flange; sides: number of the post's sides, 0 for round.
+    """
 
     style: Style = "iron"
     height: float = 1.0
@@ -65,7 +66,7 @@ def bollard(parameters: Bollard | None = None) -> Mesh:
 
 
 def _radius(p: Bollard, z: float) -> float:
-    """Of the post at this height."""
+    """Radius of the post at this height."""
     share = z / p.height
     return p.radius * {"iron": 1.06 - 0.2 * share, "concrete": 1.12 - 0.26 * share}.get(p.style, 1.0)
 
@@ -96,7 +97,7 @@ def _neck(p: Bollard) -> float:
 
 
 def _post(p: Bollard) -> Float:
-    """The shaft, of cast iron with rings around it."""
+    """The shaft; one of cast iron has rings around it."""
     top = _neck(p)
     low = 0.28 * p.height if p.style == "iron" else 0.02
     rows = [(_radius(p, z), z) for z in np.linspace(low, top, 5)]
@@ -108,7 +109,7 @@ def _post(p: Bollard) -> Float:
 
 
 def _cap(p: Bollard) -> Float:
-    """From the neck to the top."""
+    """The cap, from the neck to the top."""
     z, r, h = _neck(p), _radius(p, _neck(p)), p.height
     a = np.linspace(0, np.pi / 2, 7)
     if p.top == "flat":

@@ -31,7 +31,7 @@ Binding = Literal["boards", "paper"]
 
 @dataclass(frozen=True)
 class Book:
-    """Parameters of a book; metres, colours sRGB 0..1: ground, picture, letters. width, height: of its closed cover."""
+    """Parameters of a book; metres, colours sRGB 0..1: ground, picture, letters. width, height: size of the closed cover."""
 
     pose: Pose = "lying"
     binding: Binding = "boards"
@@ -216,7 +216,7 @@ def draw(rng: np.random.Generator) -> Book:
 
 
 _THICK: dict[Pose, tuple[float, float]] = {"lying": (0.018, 0.05), "standing": (0.028, 0.055), "open": (0.018, 0.045)}
-"""A thin book does not stand by itself."""
+"""Range of thicknesses of a book, metres; a thin book would not stand by itself."""
 
 _COLORS: tuple[tuple[Color, Color, Color], ...] = (
     ((0.12, 0.2, 0.36), (0.75, 0.5, 0.3), (0.95, 0.9, 0.78)),

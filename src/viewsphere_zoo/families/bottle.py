@@ -125,7 +125,7 @@ class Bottle:
 def bottle(parameters: Bottle | None = None) -> Mesh:
     """The bottle in metres, its axis on z, its label's face towards -Y.
 
-    Parts: body, inside, and where it has them label, neck_label, cap.
+    Parts: body, inside, and if present label, neck_label, cap.
     """
     p = parameters or Bottle()
     form = FORMS[p.form]

@@ -39,7 +39,7 @@ SHAPES: dict[Shape, tuple[tuple[float, float], ...]] = {
 @dataclass(frozen=True)
 class Bowl:
     """Parameters of a bowl; metres, colours sRGB 0..1. pattern: one of `PATTERNS`, on the outside, or none;
-    bands: lines within.
+    bands: number of lines inside.
     """
 
     shape: Shape = "round"
@@ -57,7 +57,7 @@ class Bowl:
 
 
 def bowl(parameters: Bowl | None = None) -> Mesh:
-    """The bowl in metres, its axis on z. Parts: body, rim, inside, and content where something is in it."""
+    """The bowl in metres, its axis on z. Parts: body, rim, inside, and content unless it is empty."""
     p = parameters or Bowl()
     wall = {"porcelain": 0.0035, "stoneware": 0.005, "wood": 0.007, "steel": 0.0014}[p.ware]
     h = np.array([k for k, _ in SHAPES[p.shape]])
@@ -102,7 +102,7 @@ def _coats(p: Bowl) -> dict[str, Material]:
 
 
 def _pictures(p: Bowl) -> tuple[list[Image], dict[str, charts.Chart]]:
-    """Its prints, and how they lie on it."""
+    """The bowl's prints, and their mapping to its surface."""
     rng = np.random.default_rng(p.seed)
     r = p.radius
     if p.ware == "steel":

@@ -44,7 +44,7 @@ SHEET = 0.004
 class Box:
     """Parameters of a box; metres, degrees, colours sRGB 0..1.
 
-    flaps: how far those of the front, rear, left and right stand open, 0 closed, 90 upright; label: where the address is stuck.
+    flaps: how far the front, rear, left and right flaps are open, 0 closed, 90 upright; label: position of the address label.
     """
 
     style: Style = "taped"
@@ -67,7 +67,7 @@ class Box:
 
 
 def box(parameters: Box | None = None) -> Mesh:
-    """The box in metres, on z = 0, hollow. Parts: walls, inside, and flap_*, tape, lid and label where it has them."""
+    """The box in metres, on z = 0, hollow. Parts: walls, inside, and if present flap_*, tape, lid and label."""
     p = parameters or Box()
     rng = np.random.default_rng(p.seed)
     w, d, h = p.width, p.depth, p.height
@@ -124,14 +124,14 @@ def _tiled(corners: Float, normals: Float) -> Float:
 
 
 def _flaps(p: Box, plain: Material) -> list[Piece]:
-    """Four flaps on their hinges; those of the longer sides, front and rear, close over the others."""
+    """Four flaps on their hinges; the flaps of the longer sides (front and rear) close over the others."""
     w, d, h = p.width, p.depth, p.height
     angles = p.flaps if p.style == "open" else (0.0, 0.0, 0.0, 0.0)
     pieces: list[Piece] = []
     for k, (name, angle) in enumerate(zip(("front", "rear", "left", "right"), angles, strict=True)):
         wide, deep = (w, d) if k < 2 else (d, w)
         if k > 1 and not angle:
-            continue  # under the others, where nobody sees it
+            continue  # under the others, out of sight
         long = d / 2 - 6e-4 if k < 2 else min(d / 2, 0.5 * w)
         slab = cuboid((-wide / 2 + 0.001, 0, -SHEET), (wide / 2 - 0.001, long, 0))
         slab = moved(turned(slab, 0, np.radians(angle)), (0, -deep / 2, h))

@@ -51,9 +51,9 @@ RoofUnit = Literal["none", "rear", "front", "long"]
 class Bus:
     """Parameters of a bus; lengths in metres, colours sRGB 0..1.
 
-    roundness: 0 boxy to 1 soft; pitch: from window to window; flush: whether panes lie over one dark band; doors: 1 to 3, on
-    door_side; split: a windscreen of two panes; route: what its display says, capitals and digits; skirt_color: the wall below
-    the bumpers' line, stripe_color: of its livery.
+    roundness: 0 boxy to 1 soft; pitch: distance from window to window; flush: whether panes lie over one dark band; doors: 1
+    to 3, on door_side; split: a windscreen of two panes; route: text on its display, capitals and digits; skirt_color: the
+    wall below the bumpers' line, stripe_color: of its livery.
     """
 
     style: Style = "city"
@@ -81,7 +81,7 @@ class Bus:
 
     @property
     def wheel(self) -> Wheel:
-        """Its tyres' measures."""
+        """The measures of the bus' tyres."""
         return Wheel(radius=self.wheel_radius, width=0.28, rim=0.58)
 
 
@@ -103,7 +103,7 @@ def bus(parameters: Bus | None = None) -> Mesh:
 
 
 def bus_random(rng: np.random.Generator) -> Mesh:
-    """A bus with parameters drawn as they are found on roads."""
+    """A bus with parameters drawn to resemble real buses."""
     return bus(draw(rng))
 
 

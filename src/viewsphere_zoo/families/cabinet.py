@@ -53,10 +53,10 @@ _STONES = {
 class Cabinet:
     """Parameters of a cabinet; lengths in metres.
 
-    columns: bays side by side, each from below (`carcass.Column`); base: what it stands on, `foot` high; top: thickness of the
+    columns: bays side by side, each from below (`carcass.Column`); base: its support, `foot` high; top: thickness of the
     top, and `overhang` of it on three sides; cornice: a moulding instead of a plain top; frame: width of the frame around a
     door's panel, 0 for flat; ajar, pulled: an open door, degrees, and an open drawer; basin, cooker: columns under a sink and a
-    hob; gas: burners; stone: of a worktop; contrast: the top's wood, if another; seed: of the grain.
+    hob; gas: burners; stone: of a worktop; contrast: the top's wood, if it differs; seed: of the grain.
     """
 
     style: Style = "chest"
@@ -122,7 +122,7 @@ def cabinet(parameters: Cabinet | None = None) -> Mesh:
 
 
 def _base(p: Cabinet, timber: Timber, over: Timber) -> list[Piece]:
-    """Legs, a plinth that lies back, or short feet."""
+    """Legs, a recessed plinth, or short feet."""
     x, y, z = p.box.half, p.depth / 2, p.foot
     if p.base == "legs":
         inset = 0.07 if p.leg in ("splayed", "hairpin") else 0.035
@@ -189,7 +189,7 @@ def surfaces(parameters: Cabinet) -> tuple[LevelFace, ...]:
 
 
 def cabinet_random(rng: np.random.Generator) -> Mesh:
-    """A cabinet with parameters drawn as they are found in homes."""
+    """A cabinet with parameters drawn to resemble cabinets in real homes."""
     return cabinet(draw(rng))
 
 

@@ -36,7 +36,7 @@ COLA = Label("COLA", "CLASSIC", "", "wave", ((0.75, 0.08, 0.08), (0.95, 0.93, 0.
 
 @dataclass(frozen=True)
 class Can:
-    """Parameters of a can; metres. ring: whether a tin has a ring to pull; beads: grooves around its wall."""
+    """Parameters of a can; metres. ring: whether a tin has a pull ring; beads: grooves around its wall."""
 
     kind: Kind = "drink"
     height: float = 0.122
@@ -62,7 +62,7 @@ def can(parameters: Can | None = None) -> Mesh:
 
 
 def _drink(p: Can, steel: Material) -> tuple[list[Piece], float, float]:
-    """A thin wall, drawn in at both ends, printed all over; and where the print begins and ends."""
+    """A thin wall, drawn in at both ends, printed all over; with the heights where the print begins and ends."""
     r, h = p.radius, p.height
     neck = r - 0.0055
     low, high = 0.008, h - 0.011
@@ -102,7 +102,9 @@ def _tab(length: float, deck: float) -> Solid:
 
 
 def _tin(p: Can, steel: Material) -> tuple[list[Piece], float, float]:
-    """A wall with seams at both ends and grooves, mostly under a paper label; and where that begins and ends."""
+    """A wall with seams at both ends and grooves, mostly under a paper label; with the heights where the label begins and
+    ends.
+    """
     r, h = p.radius, p.height
     edge = r + 0.0013
     low, high = 0.0055, h - 0.0055
@@ -141,7 +143,7 @@ def _paper(wall: Float, low: float, high: float) -> Solid:
 
 
 def _pull(size: float, radius: float, deck: float) -> Solid:
-    """A ring to pull, flat on the lid, riveted near its edge."""
+    """A pull ring, flat on the lid, riveted near its edge."""
     middle = (0, -0.62 * radius + 1.15 * size, deck + 0.0014)
     outer, inner = superellipse(0.8 * size, size, 2.2, 28), superellipse(0.55 * size, 0.72 * size, 2.2, 28)
     nose = superellipse(0.34 * size, 0.36 * size, 3.0, 28)

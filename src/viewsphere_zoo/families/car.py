@@ -46,10 +46,10 @@ SKELETON = (
 class Car:
     """Parameters of a car; lengths in metres, colours sRGB 0..1.
 
-    length, width (without mirrors) and height (without rack and aerial) are the body's; None takes the usual measure of
+    length, width (without mirrors) and height (without rack and aerial) are the body's; None stands for the usual measure of
     the body style. proportions: the car's side view; roundness: 0 boxy to 1 soft; dome: height of a bulge in the bonnet;
-    windows: 1 to 3 on a side; slant: how far the rear side windows rise towards the rear, fraction of their height;
-    flare: height of the wheel arches' lips; flakes: 0 solid paint to 1 strong metallic; phase: turn of the rims, radians.
+    windows: 1 to 3 on a side; slant: how far the rear side windows rise towards the rear, fraction of their height; flare:
+    height of the wheel arches' lips; flakes: 0 solid paint to 1 strong metallic; phase: turn of the rims, radians.
     """
 
     body: Body = "sedan"
@@ -135,7 +135,7 @@ def _shell(p: Car, shape: Shape, c: Coats) -> list[Piece]:
 
 
 def _fitted(p: Car, shape: Shape, c: Coats) -> list[Piece]:
-    """Everything that is screwed to the shell."""
+    """All parts fitted to the shell."""
     rear_door = p.body != "pickup" or _windows(p) > 1
     pieces = [
         *lights.headlights(shape, p.lamps, c),
@@ -157,7 +157,7 @@ def _fitted(p: Car, shape: Shape, c: Coats) -> list[Piece]:
 
 
 def car_random(rng: np.random.Generator) -> Mesh:
-    """A car with parameters drawn as they are found on roads."""
+    """A car with parameters drawn to resemble real cars."""
     return car(draw(rng))
 
 

@@ -76,7 +76,7 @@ def _pieces(p: Chair) -> list[Piece]:
 
 
 def chair_random(rng: np.random.Generator) -> Mesh:
-    """A chair with parameters drawn as they are found in homes and offices."""
+    """A chair with parameters drawn to resemble chairs in homes and offices."""
     return chair(draw(rng))
 
 

@@ -20,7 +20,7 @@ LENGTH = 11.0
 """Length of every driveway and path, metres."""
 
 TOP = 0.03
-"""Metres from its foot up to the paving."""
+"""Height of the paving above its foot, metres."""
 
 Surface = Literal["slabs", "bricks", "asphalt", "gravel"]
 

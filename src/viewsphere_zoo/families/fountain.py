@@ -31,8 +31,9 @@ Style = Literal["tiers", "jets", "column"]
 class Fountain:
     """Parameters of a fountain; metres, colour sRGB 0..1.
 
-    radius: of the basin; wall: its height; sides: of the basin, 0 round; height: of bowls or column; bowls: how many; jets: in
-    the ring, or spouts of a column; spray: height of the jets; steps: around the basin; seed draws drops and ripples.
+    radius: of the basin; wall: its height; sides: of the basin, 0 round; height: of bowls or column; bowls: their number;
+    jets: number in the ring, or of a column's spouts; spray: height of the jets; steps: around the basin; seed draws drops and
+    ripples.
     """
 
     style: Style = "tiers"
@@ -65,7 +66,9 @@ def fountain(parameters: Fountain | None = None) -> Mesh:
 
 
 def _turned(profile: list[tuple[float, float]], sides: int) -> Solid:
-    """A profile about the axis; with sides it has flats, one of them in front, and the profile's radii are theirs."""
+    """A profile about the axis; with `sides` it has flats, one of them in front, and the profile's radii are measured to the
+    flats.
+    """
     if not sides:
         return lathe(profile, 36)
     a = np.pi / sides - np.pi / 2 + np.arange(sides) * 2 * np.pi / sides
@@ -112,7 +115,7 @@ def _pool(p: Fountain, z: float, rng: np.random.Generator) -> Solid:
 
 
 def _bowl(radius: float, depth: float) -> list[tuple[float, float]]:
-    """A shallow bowl's profile about z = 0, its rim's height."""
+    """A shallow bowl's profile, with its rim at z = 0."""
     return [
         (0.1, -depth),
         (0.35 * radius, -0.9 * depth),
@@ -193,7 +196,7 @@ def _curtain(radius: float, top: float, bottom: float, count: int, rng: np.rando
 
 
 def _plume(z: float, height: float, count: int, reach: float, rng: np.random.Generator) -> Solid:
-    """A jet that rises and falls apart all around."""
+    """A jet that rises and breaks up all around."""
     t = np.linspace(0, 1, 9)
     one = np.stack([reach * t, 0 * t, z + 4 * height * t * (1 - 0.62 * t) / 1.62], axis=1)
     arc = tube(one, 0.012 + 0.02 * t, 4)

@@ -104,7 +104,7 @@ def hair_drier(parameters: HairDrier | None = None) -> Mesh:
 
 
 def hair_drier_random(rng: np.random.Generator) -> Mesh:
-    """A drier with parameters drawn as they are found in shops."""
+    """A drier with parameters drawn to resemble driers in shops."""
     style: Style = "ring" if rng.random() < 0.22 else "pistol"
     ring = style == "ring"
     nozzle: Nozzle = ("concentrator", "diffuser", "plain")[int(rng.choice(3, p=(0.5, 0.22, 0.28)))]
@@ -207,7 +207,7 @@ def _disc(radius: float, at: float, faces_front: bool) -> Solid:
 
 
 def _rear_grille(radius: float, coats: _Coats) -> list[Piece]:
-    """Rings and bars before a dark disc."""
+    """Rings and bars in front of a dark disc."""
     solids = [_bead(radius * f, 0.003, 0.0016, 40) for f in (0.3, 0.5, 0.7, 0.88)]
     bar = moved(rounded_box((radius * 0.76, 0.0026, 0.003), 0.001, 1), (radius * 0.6, 0, 0.004))
     solids += [turned(bar, 2, k * np.pi / 3) for k in range(6)]
@@ -290,7 +290,7 @@ def _diffuser(p: HairDrier, mouth: float, end: float, coats: _Coats) -> list[Pie
 
 
 def _ring_head(p: HairDrier, coats: _Coats) -> list[Piece]:
-    """A thick tube, open from end to end, with a bright rim; the nozzle clings to its front."""
+    """A thick tube, open from end to end, with a bright rim; the nozzle sits on its front."""
     r, hole = _radius(p), 0.5 * _radius(p)
     end = p.length - _nozzle_length(p)
     turn = np.linspace(0, np.pi / 2, 5)

@@ -35,8 +35,8 @@ class House:
     """Parameters of a house; lengths in metres, colours sRGB 0..1.
 
     width, depth: of the main block; roof: gable has its ridge across the front, front_gable shows its gable there; slope: rise
-    over run; wing: whether a narrow gabled block stands before the front; garage: 1 on the house's left (+X), -1 right, 0 none;
-    upper: the wall of the upper storey or gable, None if it is as below; seed draws the rest: curtains, grain.
+    over run; wing: whether a narrow gabled block projects from the front; garage: 1 on the house's left (+X), -1 right, 0 none;
+    upper: the wall of the upper storey or gable, None if it matches the wall below; seed draws the rest: curtains, grain.
     """
 
     width: float = 9.5
@@ -64,7 +64,7 @@ class House:
 
     @property
     def footprint(self) -> tuple[float, float]:
-        """Width and depth of all its walls."""
+        """Width and depth of the outline of all walls."""
         return self.width + (building.GARAGE if self.garage else 0.0), self.depth + (building.WING if self.wing else 0.0)
 
     @property
@@ -90,7 +90,7 @@ def house(parameters: House | None = None) -> Mesh:
 
 
 def house_random(rng: np.random.Generator) -> Mesh:
-    """A house with parameters drawn as they are found in suburbs."""
+    """A house with parameters drawn to resemble suburban houses."""
     return house(draw(rng))
 
 

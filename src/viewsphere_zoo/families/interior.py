@@ -72,7 +72,7 @@ def interior_random(rng: np.random.Generator) -> Mesh:
 
 
 def draw(rng: np.random.Generator) -> Interior:
-    """The parameters of a random interior: a room in three of four draws, else a flat."""
+    """The parameters of a random interior: a room in three of four cases, else a flat."""
     rooms = single(rng) if rng.random() < 0.75 else flat(rng)
     paint: Color = (0.93, 0.93, 0.91) if rng.random() < 0.8 else (0.62, 0.46, 0.3)
     doors: tuple[Color, ...] = ((0.93, 0.92, 0.9), (0.6, 0.42, 0.26), (0.45, 0.3, 0.2), (0.36, 0.42, 0.45))
@@ -94,16 +94,16 @@ def draw(rng: np.random.Generator) -> Interior:
 
 
 def rooms(p: Interior) -> tuple[Float, ...]:
-    """The air of its rooms and of the doors between them, each a box (8, 3), metres."""
+    """The open space of its rooms and of the doorways between them, each a box (8, 3), metres."""
     inside = [Box3d.between((*room.low, 0.0), (*room.high, p.height)).corners for room in p.rooms]
     return (*inside, *(_threshold(room, o) for room in p.rooms for o in room.openings if o.opens == "door"))
 
 
 def _threshold(room: Room, o: Opening) -> Float:
-    """The air of a door in the wall between two rooms, (8, 3)."""
+    """The open space of a doorway in the wall between two rooms, (8, 3)."""
     x, y = room.middle(o.side)
     right, up = RIGHT[o.side]
-    beyond = 0.1  # of the wall's thickness: rooms and doors overlap, so that no camera is between them
+    beyond = 0.1  # share of the wall's thickness: rooms and doorways overlap, so that no camera falls between them
     ends = [(x + s * right - INNER * k * up, y + s * up + INNER * k * right) for s in o.span for k in (-beyond, 1 + beyond)]
     low, high = np.min(ends, axis=0), np.max(ends, axis=0)
     return Box3d.between((*low, o.foot), (*high, o.foot + o.height)).corners

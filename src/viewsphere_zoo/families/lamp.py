@@ -1,4 +1,4 @@
-"""Lamps that stand: on the floor (column, tripod, arc, reading lamp) or on a table (body and shade, jointed arm, globe)."""
+"""Standing lamps: on the floor (column, tripod, arc, reading lamp) or on a table (body and shade, jointed arm, globe)."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ _BODIES: dict[Body, tuple[tuple[float, float], ...]] = {
     "candlestick": ((1.0, 0), (1.0, 0.03), (0.4, 0.08), (0.25, 0.2), (0.4, 0.3), (0.22, 0.4), (0.3, 0.7), (0.2, 0.8), (0.4, 1)),
     "block": ((0.8, 0), (0.8, 1.0)),
 }
-"""Half widths, as shares of the body's largest, and heights, as shares of its own, of table lamps' bodies."""
+"""Profiles of table lamps' bodies: half widths as shares of the largest, heights as shares of the body's height."""
 
 
 @dataclass(frozen=True)
@@ -294,7 +294,7 @@ def _table(p: Lamp, coats: _Coats) -> list[Piece]:
 
 
 def _globe(p: Lamp, coats: _Coats) -> list[Piece]:
-    """A ball of milk glass on a stem, of table or floor height."""
+    """A ball of milk glass on a stem, as a table lamp or a floor lamp."""
     r, (x, y, z) = p.shade_radius, bulb(p)
     stem = rod((0, 0, 0.01), (0, 0, z - 0.96 * r), 0.012, 12)
     cup = lathe([(0, z - 1.05 * r), (0.4 * r, z - 0.98 * r), (0.45 * r, z - 0.87 * r), (0, z - 0.87 * r)], 24)
@@ -318,7 +318,7 @@ _STYLES = {
 
 
 def lamp_random(rng: np.random.Generator) -> Mesh:
-    """A lamp with parameters drawn as they are found in homes."""
+    """A lamp with parameters drawn to resemble lamps in real homes."""
     return lamp(draw(rng))
 
 

@@ -28,7 +28,7 @@ class Landscape:
 
 
 def landscape(parameters: Landscape | None = None) -> Mesh:
-    """The country around a street, whose 60 x 200 m are left out; the road goes on at both ends.
+    """The country around a street, without the street's own 60 x 200 m; the road continues at both ends.
 
     Parts: meadow, hill, road, thicket, wood, house.
     """
@@ -41,7 +41,7 @@ def landscape(parameters: Landscape | None = None) -> Mesh:
 
 
 def landscape_random(rng: np.random.Generator) -> Mesh:
-    """A country with all parameters drawn."""
+    """A landscape with all parameters drawn."""
     return landscape(draw(rng))
 
 

@@ -51,7 +51,7 @@ class Laptop:
 
     thickness: of the base at its rear; wedge: how much thinner it is in front, a share; angle: between base and lid;
     bezel: of the screen at its sides; numbers: with a block of number keys; emblem: disc or bar, on the lid, or none;
-    bare: of metal; show: one of `SHOWS`.
+    bare: whether it is of bare metal; show: one of `SHOWS`.
     """
 
     width: float = 0.32
@@ -143,7 +143,7 @@ def _keyboard(field: tuple[float, float], numbers: bool) -> Float:
 
 
 def _lid(p: Laptop, body: Material, rng: np.random.Generator) -> tuple[list[Piece], screens.Image, charts.Chart]:
-    """The lid, made upright and then leant back about the hinge; its picture, and where that lies."""
+    """The lid, made upright and then leant back about the hinge; its picture, and the position of that picture."""
     w, tall, thick = p.width, p.depth - 0.012, 0.0055
     black = Material("glass", linear((0.03, 0.03, 0.033)), roughness=0.15, clearcoat=0.6)
     lean, at = -np.radians(p.angle - 90), (0, p.depth / 2 - 0.011, p.thickness + 0.001)
@@ -152,7 +152,7 @@ def _lid(p: Laptop, body: Material, rng: np.random.Generator) -> tuple[list[Piec
         return moved(turned(solid, 0, lean), at)
 
     def standing(solid: Solid) -> Solid:
-        """A slab's z becomes -y: it was made lying on its back."""
+        """A slab set upright (z becomes -y), because it was built lying on its back."""
         return moved(turned(solid, 0, np.pi / 2), (0, 0, tall / 2 + 0.004))
 
     low, high = 0.004 + 0.018, 0.004 + tall - p.bezel - 0.002

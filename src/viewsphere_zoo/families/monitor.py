@@ -109,7 +109,7 @@ def _bent(p: Monitor, solid: Solid) -> Solid:
 
 
 def _hung(p: Monitor, solid: Solid, bend: bool = True) -> Solid:
-    """From the head's own axes, its lower edge at z = 0, to its place: leant back about its middle."""
+    """A solid moved from the head's own axes (lower edge at z = 0) to its place: leant back about its middle."""
     bent = _bent(p, solid) if bend else solid
     middle = np.array((0, 0, p.height / 2))
     leant = turned(Solid(bent.vertices - middle, bent.triangles), 0, -np.radians(p.tilt))
@@ -123,7 +123,7 @@ def _frame(x: Float, h: float) -> Solid:
 
 
 def _back(p: Monitor) -> Solid:
-    """The housing's middle behind, that bulges."""
+    """The bulging middle of the housing's rear."""
     w, h = p.width, p.height
     levels = ((0.98, 0.011), (0.94, 0.016), (0.72, 0.011 + 0.8 * p.bulge), (0.62, 0.012 + p.bulge))
     if p.curve:

@@ -65,7 +65,7 @@ def motorcycle(parameters: Motorcycle | None = None) -> Mesh:
 
 
 def motorcycle_random(rng: np.random.Generator) -> Mesh:
-    """A motorcycle with parameters drawn as they are found on roads."""
+    """A motorcycle with parameters drawn to resemble real motorcycles."""
     return motorcycle(draw(rng))
 
 

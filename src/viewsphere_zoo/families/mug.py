@@ -42,8 +42,8 @@ SHAPES: dict[Shape, tuple[tuple[float, float], ...]] = {
 
 @dataclass(frozen=True)
 class Mug:
-    """Parameters of a mug; metres, colours sRGB 0..1. pattern: one of `PATTERNS`, or none; tag: of a tea bag, over the lip;
-    reach: how far the handle stands out.
+    """Parameters of a mug; metres, colours sRGB 0..1. pattern: one of `PATTERNS`, or none; tag: whether a tea bag's tag hangs
+    over the lip; reach: how far the handle stands out.
     """
 
     shape: Shape = "straight"
@@ -67,7 +67,7 @@ class Mug:
 def mug(parameters: Mug | None = None) -> Mesh:
     """The mug in metres, its axis on z, its handle towards +X.
 
-    Parts: body, rim, inside, handle; content, tag and spoon if there are.
+    Parts: body, rim, inside, handle; content, tag and spoon if it has them.
     """
     p = parameters or Mug()
     h = np.linspace(0, 1, 18)
@@ -114,7 +114,7 @@ def _print(p: Mug) -> Image:
 
 
 def _handle(p: Mug, shell: Vessel) -> Solid:
-    """A flattened bow in the plane y = 0; its ends lie inside of the wall."""
+    """A flattened bow in the plane y = 0; its ends are inside the wall."""
     at = curve(np.array([0.2, 0.82]), SHAPES[p.shape]) * p.radius - 0.6 * p.wall
     low, high = np.array((0, at[0], 0.2 * p.height)), np.array((0, at[1], 0.82 * p.height))
     path = _HANDLES[p.handle](low, high, p.radius + p.reach)
@@ -190,7 +190,7 @@ def _tag(p: Mug, lip: float) -> list[Piece]:
 
 
 def _spoon(p: Mug, lip: float) -> Piece:
-    """The handle of a spoon that leans on the lip, away from the mug's own."""
+    """The handle of a spoon that leans on the lip, on the side away from the mug's own handle."""
     foot, rest = np.array((0, 0.5 * lip, 0.012)), np.array((0, -lip + 0.003, p.height + 0.0015))
     path = foot + np.array([0, 0.4, 0.8, 1.0, 1.12, 1.25, 1.34, 1.36])[:, None] * (rest - foot)
     half = np.array([1.8, 1.6, 1.6, 1.8, 2.4, 3.4, 3.2, 1.2])[:, None, None] * 1e-3

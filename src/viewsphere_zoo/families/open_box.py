@@ -1,4 +1,4 @@
-"""Open boxes: crates and bins of five boards, into which things are put."""
+"""Open boxes: crates and bins of five boards, to be filled with objects."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ PLASTICS: tuple[Color, ...] = ((0.2, 0.33, 0.47), (0.55, 0.56, 0.57), (0.62, 0.1
 
 @dataclass(frozen=True)
 class OpenBox:
-    """Parameters of a box; metres, outside, colours sRGB 0..1."""
+    """Parameters of a box; outside measures in metres, colours sRGB 0..1."""
 
     width: float = 0.6
     height: float = 0.25
@@ -43,7 +43,7 @@ def open_box_random(rng: np.random.Generator) -> Mesh:
 
 
 def open_box_sized(rng: np.random.Generator, size: tuple[float, float, float]) -> Mesh:
-    """A box of this width, height and length in a material that is drawn."""
+    """A box of this width, height and length in a random material."""
     is_wooden = bool(rng.random() < 0.5)
     colors = WOODS if is_wooden else PLASTICS
     return open_box(OpenBox(*size, is_wooden, colors[int(rng.integers(len(colors)))]))

@@ -17,8 +17,8 @@ from viewsphere_zoo.townscape.surfaces import finished, mapped
 class Outskirts:
     """Parameters of the country around a town; metres.
 
-    half: half the town's width and length, which are left out; hills: height of the ridge all around; reach: its distance;
-    woods: groups of distant trees; houses: distant houses; seed draws where they stand.
+    half: half the width and length of the town, whose area is left out; hills: height of the ridge all around; reach: its
+    distance; woods: groups of distant trees; houses: distant houses; seed draws where they stand.
     """
 
     half: tuple[float, float] = (97.0, 126.0)

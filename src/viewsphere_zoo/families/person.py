@@ -22,7 +22,7 @@ from viewsphere_zoo.people.skeleton import JOINTS, PARENTS, skeleton
 from viewsphere_zoo.shapes.paint import Color
 
 CLIPS = ("walk", "run", "stand", "sit")
-"""Its animations; the first is what is played where none is named."""
+"""A person's animations; the first one plays by default."""
 
 SKINS: tuple[Color, ...] = ((0.24, 0.15, 0.11), (0.48, 0.32, 0.23), (0.78, 0.58, 0.45), (0.93, 0.77, 0.68))
 DARK_HAIR: tuple[Color, ...] = ((0.06, 0.05, 0.045), (0.11, 0.075, 0.05), (0.19, 0.12, 0.075))
@@ -43,8 +43,8 @@ SHOES: tuple[Color, ...] = ((0.08, 0.07, 0.07), (0.26, 0.16, 0.09), (0.85, 0.84,
 
 @dataclass(frozen=True)
 class Person:
-    """A person: body, looks, clothes, how it moves, and whether it walks where nothing is played (else it stands). Bodies of
-    MakeHuman's know an `age`, from 0 (young) to 1 (old), and a `heritage`: shares of African, Asian and Caucasian.
+    """A person: body, looks, clothes, how it moves, and whether it walks when no animation plays (else it stands). MakeHuman
+    bodies also have an `age`, from 0 (young) to 1 (old), and a `heritage`: the shares of African, Asian and Caucasian.
     """
 
     build: Build = field(default_factory=Build)
@@ -70,7 +70,7 @@ def person(parameters: Person | None = None) -> RiggedModel:
 
 
 def made_of() -> str:
-    """A digest of what people are made of beside this package's sources: MakeHuman's data, where they were set up."""
+    """A digest of the data used for people apart from this package's sources: MakeHuman's data, if set up."""
     return makehuman.digest()
 
 
@@ -99,7 +99,7 @@ def draw(rng: np.random.Generator) -> Person:
 
 
 def _heritage(rng: np.random.Generator, looks: Looks) -> tuple[float, float, float]:
-    """Shares of shapes that suit a skin."""
+    """Shares of MakeHuman's heritage shapes that suit a skin tone."""
     fair = (sum(looks.skin) - 0.5) / 1.9
     african, asian, caucasian = rng.dirichlet((0.2 + 1.5 * max(0.6 - fair, 0), 0.7, 0.2 + 1.2 * fair)).tolist()
     return african, asian, caucasian
@@ -139,7 +139,7 @@ def _outfit(rng: np.random.Generator, is_man: bool) -> Outfit:
 
 
 def _dye(rng: np.random.Generator) -> Color:
-    """A colour of cloth: any hue, seldom bright."""
+    """A cloth colour: any hue, seldom bright."""
     r, g, b = colorsys.hsv_to_rgb(float(rng.random()), float(rng.beta(2, 2)) * 0.85, float(rng.uniform(0.15, 0.9)))
     return r, g, b
 

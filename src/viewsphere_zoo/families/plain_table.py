@@ -15,7 +15,7 @@ from viewsphere_zoo.shapes.solids import join, moved, rounded_box
 TOPS: tuple[Color, ...] = ((0.76, 0.59, 0.41), (0.66, 0.48, 0.3), (0.33, 0.23, 0.155), (0.9, 0.89, 0.86), (0.6, 0.61, 0.62))
 
 BOARD = 0.03
-"""Metres that the board is thick."""
+"""Thickness of the board, metres."""
 
 
 @dataclass(frozen=True)
@@ -30,7 +30,7 @@ class PlainTable:
 
 
 def plain_table(parameters: PlainTable | None = None) -> Mesh:
-    """The table in metres, on z = 0, its top level. Parts: top, and leg where there is room for legs."""
+    """The table in metres, on z = 0, its top level. Parts: top, and leg if there is room for legs."""
     p = parameters or PlainTable()
     thick = min(BOARD, p.height)
     board = moved(rounded_box((p.width, p.length, thick), 0.15 * thick, 2), (0, 0, p.height - thick / 2))
@@ -52,7 +52,7 @@ def plain_table_random(rng: np.random.Generator) -> Mesh:
 
 
 def plain_table_sized(rng: np.random.Generator, size: tuple[float, float, float]) -> Mesh:
-    """A table of this width, height and length in a colour that is drawn."""
+    """A table of this width, height and length in a random colour."""
     return plain_table(PlainTable(*size, TOPS[int(rng.integers(len(TOPS)))]))
 
 

@@ -51,7 +51,7 @@ class Plant:
     """Parameters of a potted plant; metres, colours sRGB 0..1.
 
     habit: one of `HABITS`; reach: how far it grows above the soil; pattern: one of `PATTERNS` on the pot, or none;
-    saucer: whether one is under it.
+    saucer: whether a saucer is under the pot.
     """
 
     habit: str = "ficus"
@@ -77,7 +77,7 @@ class Plant:
 def plant(parameters: Plant | None = None) -> Mesh:
     """The plant in metres, its pot on the z axis.
 
-    Parts: pot, soil, leaves; saucer, stems, spines and flowers where it has them.
+    Parts: pot, soil, leaves; saucer, stems, spines and flowers if it has them.
     """
     p = parameters or Plant()
     rng = np.random.default_rng(p.seed)

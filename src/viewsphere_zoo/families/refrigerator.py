@@ -41,13 +41,13 @@ SKELETON = (
 Style = Literal["bottom_freezer", "top_freezer", "side_by_side", "french", "retro"]
 Handle = Literal["bar", "grip", "chrome"]
 Door = tuple[float, float, float, float, int, bool]
-"""x from, z from, x to, z to, the side of its hinges (-1, 1, or 0 for a drawer), whether it is the cold part's main door."""
+"""A door: lowest x and z, highest x and z, side of its hinges (-1, 1, or 0 for a drawer), whether it is the main door."""
 
 WALL = 0.045
 """Thickness of the insulated walls, metres."""
 
 GAP = 0.008
-"""Between doors, metres."""
+"""Gap between doors, metres."""
 
 
 @dataclass(frozen=True)
@@ -56,7 +56,7 @@ class Refrigerator:
 
     split: the freezer's share of the height, or of the width where doors are side by side; rounding: of body and doors; steel:
     brushed steel instead of lacquer of this colour; ajar: how far the main door stands open, degrees; dispenser: for water and
-    ice in the door; display: a lit panel; notes: held by magnets on the door; seed: of what is inside and of the notes.
+    ice in the door; display: a lit panel; notes: held by magnets on the door; seed: of the contents and the notes.
     """
 
     style: Style = "bottom_freezer"
@@ -81,7 +81,7 @@ class Refrigerator:
 
     @property
     def face(self) -> float:
-        """y of the body's front, on which the doors lie."""
+        """y of the body's front, behind the doors."""
         return -self.depth / 2 + 0.055
 
     @property
@@ -163,7 +163,7 @@ def _body(p: Refrigerator, coats: _Coats) -> list[Piece]:
 
 
 def _rear(p: Refrigerator, coats: _Coats) -> list[Piece]:
-    """The condenser's coil and wires, and the compressor in its niche, as one sees them from behind."""
+    """The condenser's coil and wires, and the compressor in its niche, as seen from behind."""
     x, rear, low, high = p.width / 2 - 0.07, p.depth / 2, p.foot + 0.3, p.height - 0.16
     rows = np.linspace(low, high, 12)
     path = [(s * x, rear - 0.012, z) for k, z in enumerate(rows) for s in ((-1, 1) if k % 2 == 0 else (1, -1))]
@@ -243,7 +243,7 @@ def _pack(rng: np.random.Generator) -> Solid:
 
 
 def _door(p: Refrigerator, door: Door, coats: _Coats, rng: np.random.Generator) -> list[Piece]:
-    """A door with gasket, handle, hinge and what is in or on it; the main one turned open."""
+    """A door with gasket, handle, hinge and its contents or fittings; the main door is turned open."""
     x0, z0, x1, z1, hinge, is_main = door
     y0, y1 = -p.depth / 2, p.face - 0.008
     leaf = moved(
@@ -345,7 +345,7 @@ def surfaces(parameters: Refrigerator) -> tuple[LevelFace, ...]:
 
 
 def refrigerator_random(rng: np.random.Generator) -> Mesh:
-    """A refrigerator with parameters drawn as they are found in kitchens."""
+    """A refrigerator with parameters drawn to resemble those in real kitchens."""
     return refrigerator(draw(rng))
 
 

@@ -58,7 +58,7 @@ class Rug:
 
 
 def rug(parameters: Rug | None = None) -> Mesh:
-    """The rug in metres, lying on z = 0, centred, its fringes at -X and +X. Parts: pile; binding, fringe where there are."""
+    """The rug in metres, lying on z = 0, centred, its fringes at -X and +X. Parts: pile; binding and fringe if it has them."""
     p = parameters or Rug()
     rng = np.random.default_rng(p.seed)
     image = carpet(rng, p.design, p.colors, p.width / p.depth)
@@ -77,8 +77,8 @@ def rug(parameters: Rug | None = None) -> Mesh:
 
 
 def _folds(p: Rug, rng: np.random.Generator, plan: Float) -> Float:
-    """Return the height of the rug over the floor at points (..., 2), metres: soft folds that end before its border, 0 at
-    least.
+    """Return the height of the rug over the floor at points (..., 2), metres: soft folds that end before its border, never
+    below 0.
     """
     x, y = plan[..., 0], plan[..., 1]
     total = np.ones_like(x)
@@ -140,7 +140,7 @@ def _fringe(p: Rug, rng: np.random.Generator) -> Solid:
 
 
 def rug_random(rng: np.random.Generator) -> Mesh:
-    """A rug with parameters drawn as they are found in homes."""
+    """A rug with parameters drawn to resemble rugs in real homes."""
     return rug(draw(rng))
 
 

@@ -46,8 +46,8 @@ class Shelf:
 
     boards: levels on which things stand, the topmost included; columns: bays side by side; thickness: of boards and sides;
     back: a closed rear, or crossed braces of a rack; plinth: height of the lowest board's underside; crown: a moulding on top;
-    filled: share of the bays with something in them; planked: boards of a rack are of wood; seed: of grain and of what stands
-    inside.
+    filled: share of the bays with something in them; planked: whether a rack's boards are wooden; seed: of the grain and the
+    contents.
     """
 
     style: Style = "bookcase"
@@ -78,12 +78,12 @@ class Shelf:
 
     @property
     def edges(self) -> list[float]:
-        """x of the middles of the upright boards, growing."""
+        """x of the middles of the upright boards, ascending."""
         half = (self.width - self.thickness) / 2
         return np.linspace(-half, half, self.columns + 1).tolist()
 
     def deep(self, level: int) -> float:
-        """Depth of this board: a ladder's grow downwards."""
+        """Depth of this board: a ladder shelf's boards get deeper downwards."""
         if self.style != "ladder":
             return self.depth - (0.02 if self.style == "rack" else 0.0)
         return self.depth * (1.0 - 0.62 * level / max(self.boards - 1, 1))
@@ -92,7 +92,7 @@ class Shelf:
 def shelf(parameters: Shelf | None = None) -> Mesh:
     """The shelf in metres: open towards -Y, feet on z = 0, centred in x and y.
 
-    Parts: upright, board; back, brace, plinth, crown by style; book, box, vase for what stands in it.
+    Parts: upright, board; back, brace, plinth, crown by style; book, box, vase for its contents.
     """
     p = parameters or Shelf()
     rng = np.random.default_rng(p.seed)
@@ -176,7 +176,7 @@ def _rear(p: Shelf, timber: Timber) -> list[Piece]:
 
 
 def _bays(p: Shelf) -> list[tuple[float, float, int]]:
-    """Inner x from and to, and the level, of all bays from below; the top of a shelf counts as bays too."""
+    """Inner x range and level of all bays from below; the top of a shelf counts as bays too."""
     t = p.thickness / 2
     if p.style in ("rack", "ladder"):
         return [(-p.width / 2 + 0.04, p.width / 2 - 0.04, k) for k in range(p.boards)]
@@ -184,7 +184,7 @@ def _bays(p: Shelf) -> list[tuple[float, float, int]]:
 
 
 def _free(p: Shelf, level: int) -> float:
-    """Height above a board up to the next, or to the crown's moulding."""
+    """Free height above a board, up to the next board or to the crown's moulding."""
     if level + 1 == p.boards:
         return float("inf")
     crown = p.crown and p.style == "bookcase" and level + 2 == p.boards
@@ -224,7 +224,7 @@ def _stock(p: Shelf, rng: np.random.Generator) -> list[Piece]:
 
 
 def surfaces(parameters: Shelf) -> tuple[LevelFace, ...]:
-    """The boards of bays in which nothing stands, and the top of a shelf that ends in a board."""
+    """The boards of empty bays, and the top of a shelf that ends in a board."""
     p = parameters
     taken, rear = _taken(p), p.depth / 2 - 0.02
     found = [
@@ -239,7 +239,7 @@ def surfaces(parameters: Shelf) -> tuple[LevelFace, ...]:
 
 
 def shelf_random(rng: np.random.Generator) -> Mesh:
-    """A shelf with parameters drawn as they are found in homes and offices."""
+    """A shelf with parameters drawn to resemble shelves in homes and offices."""
     return shelf(draw(rng))
 
 

@@ -1,4 +1,4 @@
-"""Town buildings with a shop on the ground floor and flats above, between party walls: they stand side by side in terraces."""
+"""Town buildings with a shop on the ground floor and flats above, between party walls, for use side by side in terraces."""
 
 from __future__ import annotations
 
@@ -40,10 +40,10 @@ class Shop:
     """Parameters of a town building; lengths in metres, colours sRGB 0..1.
 
     width: from party wall to party wall; storeys: with the ground floor; ground, storey: heights of the ground floor and of
-    those above; side_door: the flats' door at the left (1, +X), right (-1) or nowhere in front (0); door, pane, riser, transom:
-    the shop's door, width of its panes, height of the wall below them, bars near their top; name: on the signs, capitals;
-    awning: how far it reaches out, 0 for none; balconies: their depth, 0 for none; painted: the name on the party walls;
-    chimneys: sides that have one; seed draws the rest: curtains, goods, grain.
+    each floor above; side_door: the flats' door at the left (1, +X), right (-1) or nowhere in front (0); door, pane, riser,
+    transom: the shop's door, width of its panes, height of the wall below them, bars near their top; name: on the signs,
+    capitals; awning: how far it reaches out, 0 for none; balconies: their depth, 0 for none; painted: the name on the party
+    walls; chimneys: sides that have one; seed draws the rest: curtains, goods, grain.
     """
 
     width: float = 7.0
@@ -88,7 +88,7 @@ class Shop:
 
     @property
     def height(self) -> float:
-        """Of the walls, metres."""
+        """Height of the walls, metres."""
         return self.ground + (self.storeys - 1) * self.storey
 
 
@@ -106,7 +106,7 @@ def shop(parameters: Shop | None = None) -> Mesh:
 
 
 def shop_random(rng: np.random.Generator) -> Mesh:
-    """A building with parameters drawn as they are found in towns."""
+    """A building with parameters drawn to resemble real town buildings."""
     return shop(draw(rng))
 
 

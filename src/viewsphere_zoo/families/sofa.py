@@ -85,7 +85,7 @@ class Sofa:
 
     @property
     def width(self) -> float:
-        """Between the outsides of its arms."""
+        """Width between the outsides of the arms."""
         return 2 * (self.inner + self.arm) + 0.04
 
     @property
@@ -136,7 +136,7 @@ def _base(p: Sofa, coats: _Coats) -> list[Piece]:
 
 
 def _seat(p: Sofa, coats: _Coats) -> list[Piece]:
-    """One cushion a seat, or one for all; the chaise's is longer."""
+    """One cushion for each seat, or one for all; a chaise's cushion is longer."""
     front, rear = -p.depth / 2, p.back_front + 0.02
     single = p.back == "plain"
     wide = 2 * p.inner if single and p.chaise == "none" else p.seat_width
@@ -151,7 +151,7 @@ def _seat(p: Sofa, coats: _Coats) -> list[Piece]:
 
 
 def _back(p: Sofa, coats: _Coats) -> list[Piece]:
-    """The back's frame and what is before it."""
+    """The back's frame and the cushions in front of it."""
     x, y = p.inner + (p.arm if p.arms == "rolled" else 0.02), p.depth / 2
     frame_top = p.height - (0.09 if p.back == "cushions" else 0.0)
     low = p.foot + 0.01
@@ -256,7 +256,7 @@ def _loose(p: Sofa, coats: _Coats, rng: np.random.Generator) -> list[Piece]:
 
 
 def surfaces(parameters: Sofa) -> tuple[LevelFace, ...]:
-    """Each seat from the sitter's right (-X), before the cushions and pillows, and the end of a chaise."""
+    """Each seat from the sitter's right (-X), in front of the cushions and pillows, and the end of a chaise."""
     p, front = parameters, -parameters.depth / 2
     rear = p.seat_rear - (0.3 if p.scattered else 0.04)
     edges = [-p.inner + k * p.seat_width for k in range(p.seats)]
@@ -272,7 +272,7 @@ def surfaces(parameters: Sofa) -> tuple[LevelFace, ...]:
 
 
 def sofa_random(rng: np.random.Generator) -> Mesh:
-    """A sofa with parameters drawn as they are found in living rooms."""
+    """A sofa with parameters drawn to resemble sofas in real living rooms."""
     return sofa(draw(rng))
 
 

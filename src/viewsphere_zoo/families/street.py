@@ -1,4 +1,4 @@
-"""Streets: road, markings, kerbs, pavements, verges and the lawns that houses stand on."""
+"""Streets: road, markings, kerbs, pavements, verges and the lawns under the houses."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from viewsphere_zoo.townscape.plan import HALF_LENGTH, PLOT, STEP
 from viewsphere_zoo.townscape.surfaces import finished
 
 WALK = (5.1, 0.7)
-"""x of the middle of the way that people take on a pavement, and its width, metres."""
+"""x of the middle of the walking lane on a pavement, and its width, metres."""
 
 Paving = Literal["slabs", "bricks", "asphalt"]
 
@@ -62,7 +62,7 @@ def street(parameters: Street | None = None) -> Mesh:
 
 
 def street_random(rng: np.random.Generator) -> Mesh:
-    """A street with parameters drawn as they are found in towns."""
+    """A street with parameters drawn to resemble real streets."""
     return street(draw(rng))
 
 
@@ -93,7 +93,7 @@ def draw(rng: np.random.Generator) -> Street:
 
 
 def lanes() -> tuple[Lane, ...]:
-    """The two lanes of every street, of drivers who keep to the right: `right` (+X) leads to +Y, `left` to -Y."""
+    """The two lanes of every street, with driving on the right: `right` (+X) leads to +Y, `left` to -Y."""
     middle, width = GUTTER / 2, GUTTER
     return tuple(
         Lane(name, ((side * middle, -side * HALF_LENGTH, 0.0), (side * middle, side * HALF_LENGTH, 0.0)), width)
@@ -102,7 +102,7 @@ def lanes() -> tuple[Lane, ...]:
 
 
 def pavements() -> tuple[Lane, ...]:
-    """The ways that people take on the two pavements of every street, between lamp posts and benches."""
+    """The walking lanes on the two pavements of every street, between lamp posts and benches."""
     return tuple(
         Lane(f"pavement_{name}", ((side * WALK[0], -HALF_LENGTH, STEP), (side * WALK[0], HALF_LENGTH, STEP)), WALK[1])
         for name, side in (("right", 1.0), ("left", -1.0))

@@ -50,10 +50,11 @@ METALS = {"black": BLACK_STEEL, "white": WHITE_STEEL, "brass": BRASS, "chrome": 
 class Table:
     """Parameters of a table; lengths in metres.
 
-    frame: what carries the top: legs of the kind `leg`, a pedestal (of metal unless `metal` is black), three feet, trestles or
-    frames of steel; apron: height of the rails under the top, 0 for none; shelf: height of a lower shelf, 0 for none;
+    frame: the support of the top: legs of the kind `leg`, a pedestal (of metal unless `metal` is black), three feet, trestles
+    or frames of steel; apron: height of the rails under the top, 0 for none; shelf: height of a lower shelf, 0 for none;
     drawers: cases of drawers under a desk, or drawers in a side table's apron; riser: height of a ledge at a desk's rear, 0
-    for none; painted_frame: legs of another colour than the top; planks: boards of which the top is glued; seed: of the grain.
+    for none; painted_frame: legs in a different colour from the top; planks: number of boards glued into the top; seed: of the
+    grain.
     """
 
     style: Style = "dining"
@@ -209,7 +210,7 @@ def _riser(p: Table, wood: Timber) -> list[Piece]:
 
 
 def surfaces(parameters: Table) -> tuple[LevelFace, ...]:
-    """The top (before the riser), the riser's ledge and the lower shelf; of round tops the square within."""
+    """The top (in front of the riser), the riser's ledge and the lower shelf; for round tops, the square inside."""
     p = parameters
     x, y = p.width / 2, p.depth / 2
     if p.top != "rectangle":
@@ -227,7 +228,7 @@ def surfaces(parameters: Table) -> tuple[LevelFace, ...]:
 
 
 def table_random(rng: np.random.Generator) -> Mesh:
-    """A table with parameters drawn as they are found in homes and offices."""
+    """A table with parameters drawn to resemble tables in homes and offices."""
     return table(draw(rng))
 
 

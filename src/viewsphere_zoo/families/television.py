@@ -41,8 +41,8 @@ class Television:
     """Parameters of a television; lengths in metres.
 
     width: of the set, its screen is 16:9 (4:3 with a tube); bezel: the frame around the screen; lift: height of the set's
-    underside over what it stands on; console_height: of a low cabinet; show: what is on, or nothing; bright: how strongly the
-    screen shines; seed: of the picture and of the grain.
+    underside above its base; console_height: of a low cabinet; show: the programme on the screen, or nothing; bright: how
+    strongly the screen shines; seed: of the picture and of the grain.
     """
 
     style: Style = "console"
@@ -58,7 +58,7 @@ class Television:
 
     @property
     def stand(self) -> float:
-        """Height of what the set stands on."""
+        """Height of the surface that the set stands on."""
         return self.console_height if self.style == "console" else 0.42 if self.style == "tube" else 0.0
 
     @property
@@ -68,7 +68,7 @@ class Television:
 
     @property
     def screen(self) -> tuple[float, float, float, float]:
-        """x from, z from, x to, z to of the lit screen."""
+        """Lowest x and z, highest x and z of the lit screen."""
         half = self.width / 2 - self.bezel
         if self.style == "tube":
             low, high = self.stand + 0.09, self.stand + 0.09 + 2 * half * 0.75
@@ -291,7 +291,7 @@ def surfaces(parameters: Television) -> tuple[LevelFace, ...]:
 
 
 def television_random(rng: np.random.Generator) -> Mesh:
-    """A television with parameters drawn as they are found in living rooms."""
+    """A television with parameters drawn to resemble those in real living rooms."""
     return television(draw(rng))
 
 

@@ -37,7 +37,7 @@ class TownGround:
 
     @property
     def blocks(self) -> tuple[tuple[blocks.Block, Use], ...]:
-        """Every block and what stands on it."""
+        """Every block with its use."""
         return tuple(zip(blocks.blocks(self.x, self.y), self.uses, strict=True))
 
     @property
@@ -99,7 +99,9 @@ def _manholes(p: TownGround, rng: np.random.Generator) -> list[tuple[float, floa
 
 
 def _lines(gaps: Sequence[float]) -> tuple[float, ...]:
-    """Middles of roads so far apart, the second and, of an even number of blocks, the middle one at 0."""
+    """Middles of roads at these spacings. The second of three roads is at 0; of four, the middle of the second and the
+    third.
+    """
     at = np.concatenate([[0.0], np.cumsum(gaps)])
     return tuple((at - at[1] if len(gaps) == 2 else at - (at[1] + at[2]) / 2).round(2).tolist())
 

@@ -35,8 +35,9 @@ Foot = Literal["square", "octagon", "round"]
 class TrafficCone:
     """Parameters of a cone; metres, colours sRGB 0..1.
 
-    height: of the tip; base: the foot's width; flare: 0 straight walls to 1 curved out at the foot; bands: (from, to) as shares
-    of the height, of white sheeting; stack: cones on one another; light: an amber lamp on top; dark_foot: of black rubber.
+    height: of the tip; base: the foot's width; flare: 0 straight walls to 1 curved out at the foot; bands: (from, to) as
+    shares of the height, of white sheeting; stack: number of cones on one another; light: an amber lamp on top; dark_foot: of
+    black rubber.
     """
 
     height: float = 0.75
@@ -52,7 +53,7 @@ class TrafficCone:
 
 
 def traffic_cone(parameters: TrafficCone | None = None) -> Mesh:
-    """The cone in metres, its axis the z axis. Parts: foot, cone, band, and where fitted light; a stack's are one each."""
+    """The cone in metres, its axis the z axis. Parts: foot, cone, band, and where fitted light; a stack has one of each."""
     p = parameters or TrafficCone()
     skin = coated("plastic", p.color, "matte")
     rubber = Material("rubber", linear((0.08, 0.08, 0.085)), roughness=0.9)

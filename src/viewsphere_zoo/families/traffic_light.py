@@ -38,10 +38,10 @@ _DARK: dict[Lit, Color] = {"red": (0.3, 0.06, 0.06), "amber": (0.32, 0.2, 0.05),
 class TrafficLight:
     """Parameters of a traffic light; metres, colours sRGB 0..1.
 
-    height: of the post; lens: diameter of a lamp; lit: the lamp that shines; sides: heads on the post, the first towards -Y,
-    two back to back, more a quarter turn apart; arm: how far a cantilever reaches (towards +X if positive); heads: on that arm;
-    border: width of a backplate around the heads, 0 for none; hood: length of the lamps' roofs; striped: bands around the post;
-    button: for people who want to cross.
+    height: of the post; lens: diameter of a lamp; lit: the lamp that shines; sides: number of heads on the post, the first
+    towards -Y, two back to back, more a quarter turn apart; arm: how far a cantilever reaches (towards +X if positive); heads:
+    on that arm; border: width of a backplate around the heads, 0 for none; hood: length of the lamps' roofs; striped: bands
+    around the post; button: whether it has a button for people who want to cross.
     """
 
     style: Style = "post"

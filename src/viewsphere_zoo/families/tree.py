@@ -56,7 +56,7 @@ def tree(parameters: Tree | None = None) -> Mesh:
 
 
 def _tints(p: Tree, rng: np.random.Generator) -> dict[str, Tint]:
-    """Vertex colours: light comes from above, every tuft is a little different, bark is streaked (a birch's is blotched)."""
+    """Vertex colours: lighter towards the top, slightly different for every tuft; bark is streaked (blotched on a birch)."""
     leaf, tone, bark = rng.spawn(3)
 
     def lit(points: Float) -> Float:
@@ -74,7 +74,7 @@ def _tints(p: Tree, rng: np.random.Generator) -> dict[str, Tint]:
 
 
 def tree_random(rng: np.random.Generator) -> Mesh:
-    """A tree with parameters drawn as they are found in gardens and along streets."""
+    """A tree with parameters drawn to resemble trees in gardens and along streets."""
     return tree(draw(rng))
 
 

@@ -51,9 +51,9 @@ Goods = Literal["none", "crates", "pipes", "gravel"]
 class Truck:
     """Parameters of a lorry; lengths in metres, colours sRGB 0..1.
 
-    length, width, height: of the whole but for mirrors (height is the box's); cab_*: of the cab; roundness: 0 boxy to 1 soft;
-    rake: how far the windscreen leans back; axles: 2 or 3; slats: bars of the grille; name: capitals on the box, empty for
-    none; goods: on an open bed or in a tub.
+    length, width, height: of the whole lorry without mirrors (height is the box's); cab_*: of the cab; roundness: 0 boxy to 1
+    soft; rake: how far the windscreen leans back; axles: 2 or 3; slats: bars of the grille; name: capitals on the box, empty
+    for none; goods: on an open bed or in a tub.
     """
 
     load: Load = "box"
@@ -85,7 +85,7 @@ class Truck:
 
     @property
     def wheel(self) -> Wheel:
-        """Its tyres' measures."""
+        """The measures of the lorry's tyres."""
         return Wheel(radius=self.wheel_radius, width=0.58 * self.wheel_radius, rim=0.57)
 
 
@@ -111,7 +111,7 @@ def truck(parameters: Truck | None = None) -> Mesh:
 
 
 def truck_random(rng: np.random.Generator) -> Mesh:
-    """A lorry with parameters drawn as they are found on roads."""
+    """A lorry with parameters drawn to resemble real lorries."""
     return truck(draw(rng))
 
 

@@ -52,7 +52,7 @@ def _hills(rng: np.random.Generator, x: Float, y: Float) -> Float:
 
 
 def _football(rng: np.random.Generator, x: Float, y: Float) -> Float:
-    """A pitch from the stand, players of two sides, the score."""
+    """A pitch seen from the stand, players of two teams, the score."""
     stripes = np.sign(np.sin(30 * (x + 0.3 * y)))
     picture = _mixed((0.12, 0.5, 0.14), (0.17, 0.6, 0.18), 0.5 + 0.5 * stripes)
     picture = _over(picture, 0.2 - y, (0.3, 0.3, 0.38))
@@ -71,7 +71,7 @@ def _football(rng: np.random.Generator, x: Float, y: Float) -> Float:
 
 
 def _news(rng: np.random.Generator, x: Float, y: Float) -> Float:
-    """A newsreader at a desk before a map, with a red band of text."""
+    """A newsreader at a desk in front of a map, with a red band of text."""
     picture = _mixed((0.05, 0.1, 0.35), (0.15, 0.35, 0.7), 1 - np.hypot(x - 0.65, y - 0.4))
     for _ in range(7):
         at, r = rng.uniform((0.45, 0.1), (0.95, 0.55)), rng.uniform(0.03, 0.12)
@@ -87,7 +87,7 @@ def _news(rng: np.random.Generator, x: Float, y: Float) -> Float:
 
 
 def _sunset(rng: np.random.Generator, x: Float, y: Float) -> Float:
-    """The sun going down over the sea, in a film's wide picture."""
+    """A sunset over the sea, in a film's wide format."""
     picture = _mixed((0.25, 0.15, 0.4), (1.0, 0.6, 0.25), y * 1.9)
     picture = _over(picture, _disc(x, y, (float(rng.uniform(0.3, 0.7)), 0.5), 0.14), (1, 0.9, 0.5))
     sea = (

@@ -17,7 +17,7 @@ from viewsphere_zoo.shapes.solids import Solid, join, moved, turned
 
 Kind = Literal["door", "pair", "drawer", "open"]
 Column = tuple[tuple[float, Kind], ...]
-"""The bays of a column from below: each one's share of the height, and its front."""
+"""The bays of a column from below: the share of the height and the front of each."""
 
 BOARD = 0.018
 """Thickness of boards, metres."""
@@ -30,8 +30,8 @@ class Carcass:
     """The box: half width, front and rear (y), bottom and top (z), columns of bays, equally wide.
 
     frame: width of the frame around a door's panel, 0 for flat fronts; ajar: by how many degrees its last door stands open;
-    pulled: by how much its last drawer is pulled out, metres; rails: open
-    above but for two rails, so that a basin can hang in it.
+    pulled: by how much its last drawer is pulled out, metres; rails: open above except for two rails, so that a basin can hang
+    in it.
     """
 
     half: float
@@ -47,7 +47,7 @@ class Carcass:
 
     @property
     def bays(self) -> Iterator[tuple[float, float, float, float, Kind, int]]:
-        """Inner x from and to, z from and to, front and number of all bays, columns from -X to +X, each from below."""
+        """Inner x range, z range, front and number of all bays: columns from -X to +X, each from below."""
         edges = np.linspace(-self.half, self.half, len(self.columns) + 1).tolist()
         number = 0
         for x0, x1, column in zip(edges[:-1], edges[1:], self.columns, strict=True):
@@ -59,7 +59,7 @@ class Carcass:
 
     @property
     def face(self) -> float:
-        """y of the front edge of the boards; fronts lie before it."""
+        """y of the front edge of the boards; the fronts are in front of it."""
         return -self.depth / 2 + BOARD
 
 
@@ -97,7 +97,7 @@ def carcass(c: Carcass, timber: Timber) -> list[Piece]:
 
 
 def fronts(c: Carcass, timber: Timber, coat: Material) -> list[Piece]:
-    """Doors and drawers with their handles; one of each stands open if so asked."""
+    """Doors and drawers with their handles; the last of each is open if `ajar` or `pulled` is set."""
     bays = list(c.bays)
     doors = [n for *_, kind, n in bays if kind in ("door", "pair")]
     drawers = [n for *_, kind, n in bays if kind == "drawer"]
@@ -139,7 +139,7 @@ def _door(
 def _drawer(
     c: Carcass, low: tuple[float, float], high: tuple[float, float], timber: Timber, coat: Material, out: float
 ) -> list[Piece]:
-    """A drawer's front, and its box where it is pulled out."""
+    """A drawer's front, with its box if it is pulled out."""
     y, wide, tall = -c.depth / 2, high[0] - low[0], high[1] - low[1]
     pieces = front(low, high, y, timber.along, "drawer", c.frame if tall > 0.18 else 0.0, BOARD)
     z = low[1] + 0.55 * tall

@@ -1,4 +1,4 @@
-"""Boards, legs, fronts and handles: what cabinets, shelves, desks and tables are put together from."""
+"""Boards, legs, fronts and handles: the components of cabinets, shelves, desks and tables."""
 
 from __future__ import annotations
 
@@ -23,13 +23,13 @@ _TURNED = (
 
 
 def block(low: ArrayLike, high: ArrayLike, bevel: float = 0.003) -> Solid:
-    """A board between two corners, its edges broken."""
+    """A board between two corners, with softened edges."""
     a, b = np.asarray(low, np.float64), np.asarray(high, np.float64)
     return moved(rounded_box(b - a, bevel, 1), (a + b) / 2)
 
 
 def leg(kind: Leg, at: tuple[float, float], top: float, size: float, away: tuple[float, float] = (0.0, 0.0)) -> Solid:
-    """A leg from the floor to z = top; size: its thickness at the top; away: direction (x, y) in which a splayed foot goes."""
+    """A leg from the floor to z = top; size: its thickness at the top; away: direction (x, y) in which the foot is splayed."""
     x, y = at
     if kind == "turned":
         return spindle((x, y, 0), (x, y, top), [(f, r * size) for f, r in _TURNED], 16)
@@ -50,7 +50,7 @@ def leg(kind: Leg, at: tuple[float, float], top: float, size: float, away: tuple
 
 
 def footed(solid: Solid) -> Solid:
-    """The solid with what reached below the floor flat on it, as a slanting leg is sawn off."""
+    """The solid with everything below the floor pressed flat onto it, like a slanting leg that is sawn off."""
     return Solid(np.maximum(solid.vertices, (-np.inf, -np.inf, 0.0)), solid.triangles)
 
 
@@ -96,7 +96,7 @@ def front(
 ) -> list[Piece]:
     """A door's or drawer's front between (x, z) corners, its face at y = face (towards -Y).
 
-    frame: width of a border around a panel that lies deeper, 0 for a plain one.
+    frame: width of a border around a recessed panel, 0 for a plain front.
     """
     (x0, z0), (x1, z1) = low, high
     if frame == 0 or min(x1 - x0, z1 - z0) < 2.6 * frame:
@@ -108,6 +108,6 @@ def front(
 
 
 def handles(part: str, coat: Material, found: list[Solid | None]) -> list[Piece]:
-    """The handles as one piece, none where there are none."""
+    """The handles as one piece; an empty list without handles."""
     solids = [s for s in found if s is not None]
     return [Piece(part, coat, join(*solids))] if solids else []

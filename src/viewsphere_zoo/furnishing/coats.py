@@ -16,7 +16,7 @@ from viewsphere_zoo.townscape.textures import Float, noise, painted
 
 Pattern = Literal["plain", "stripes", "check", "dots", "leaves", "zigzag"]
 GRAIN = (1.5, 0.75)
-"""Metres along and across the grain that a picture of wood covers."""
+"""Size of a picture of wood along and across the grain, metres."""
 
 
 @dataclass(frozen=True)
@@ -28,11 +28,11 @@ class Wood:
     gloss: float = 0.25
 
     def timber(self, image: int, name: str = "wood") -> Timber:
-        """Its materials, with the grain's picture at this index."""
+        """The wood's materials, with the grain's picture at this index."""
         wide, high = (1 / metres for metres in GRAIN)
 
         def sawn(end: str, rotation: float) -> Material:
-            # Rotation comes before the offset and after the scale, so a turned picture scales the other axis.
+            # Rotation applies after the scale and before the offset, so a turned picture scales the other axis.
             scale = (wide, high) if rotation == 0 else (high, wide)
             texture = Texture(image, scale=scale, rotation=rotation)
             rough = 0.55 - 0.2 * self.gloss
@@ -44,7 +44,7 @@ class Wood:
 
 @dataclass(frozen=True)
 class Timber:
-    """Materials of one wood: grain across what one sees from the front and along x on tops, and grain upright or along y."""
+    """Materials of one wood: grain along x (across, on fronts and tops), and grain upright or along y."""
 
     along: Material
     upright: Material
@@ -52,7 +52,7 @@ class Timber:
 
 def furnished(pieces: Sequence[Piece], images: Sequence[Image], crease_deg: float = 40.0, whole: Sequence[str] = ()) -> Mesh:
     """The pieces as one Mesh whose uv are metres, seen from the side that a triangle faces most: from above (x, -y), from the
-    front (x, -z), from the side (y, -z). Parts named in `whole` are seen from one side, so that their pattern has no seam.
+    front (x, -z), from the side (y, -z). Parts named in `whole` take one side only, so that their pattern has no seam.
     """
     mesh = assemble(pieces, crease_deg)
     a, b, c = mesh.vertices.astype(np.float64)[mesh.triangles].transpose(1, 0, 2)
@@ -91,7 +91,7 @@ def grain(rng: np.random.Generator, wood: Wood, planks: int = 0, size: int = 512
 
 
 def _glued(rng: np.random.Generator, shade: Float, planks: int) -> Float:
-    """The shade cut into boards, each from another place of the log and of its own tone, with a fine joint between them."""
+    """The shade cut into boards from different places of the log, each with its own tone, with fine joints between them."""
     size = len(shade)
     row = np.arange(size) * planks // size
     column = (np.arange(size) + rng.integers(size, size=planks)[row, None]) % size
@@ -102,7 +102,7 @@ def _glued(rng: np.random.Generator, shade: Float, planks: int) -> Float:
 
 @dataclass(frozen=True)
 class Cloth:
-    """A woven cloth: its ground, the colour of its pattern, and how wide one repeat of it is, metres."""
+    """A woven cloth: its ground, the colour of its pattern, and the width of one repeat, metres."""
 
     color: Color = (0.42, 0.46, 0.5)
     second: Color = (0.9, 0.88, 0.84)
@@ -116,7 +116,7 @@ class Cloth:
 
 
 def weave(rng: np.random.Generator, cloth: Cloth, size: int = 256) -> Image:
-    """The cloth: its pattern, and warp and weft that differ a little."""
+    """The picture of the cloth: its pattern, and warp and weft that differ a little."""
     at = (np.arange(size) + 0.5) / size
     x, y = np.meshgrid(at, at)
     share = _PATTERNS[cloth.pattern](x, y)[..., None]
@@ -126,7 +126,7 @@ def weave(rng: np.random.Generator, cloth: Cloth, size: int = 256) -> Image:
 
 
 def _sharp(value: Float) -> Float:
-    """Within 0 and 1."""
+    """The values clipped to 0..1."""
     return np.minimum(np.maximum(value, 0.0), 1.0)
 
 
@@ -162,7 +162,7 @@ def _zigzag(x: Float, y: Float) -> Float:
 _PATTERNS = {"plain": _plain, "stripes": _stripes, "check": _check, "dots": _dots, "leaves": _leaves, "zigzag": _zigzag}
 
 GLASS = Material("glass", (0.86, 0.93, 0.91, 0.35), roughness=0.03, alpha_mode="BLEND", clearcoat=1.0)
-"""A pane one can see through."""
+"""A transparent pane."""
 
 BLACK_STEEL = Material("black_steel", linear((0.09, 0.09, 0.095)), metallic=0.3, roughness=0.5)
 WHITE_STEEL = Material("white_steel", linear((0.88, 0.88, 0.87)), roughness=0.4, clearcoat=0.3)
@@ -200,14 +200,14 @@ DYES: tuple[Color, ...] = (
 
 
 def drawn_wood(rng: np.random.Generator, painted_share: float = 0.25) -> Wood:
-    """A wood, or with this probability a painted one."""
+    """A random wood, or with this probability a painted one."""
     if rng.random() < painted_share:
         return Wood(drawn_color(PAINTS, rng, 0.01), 0.12, float(rng.uniform(0.1, 0.5)))
     return Wood(drawn_color(_BARE, rng, 0.008), float(rng.uniform(0.8, 1.3)), float(rng.uniform(0.1, 0.45)))
 
 
 def drawn_cloth(rng: np.random.Generator, patterned: float = 0.25) -> Cloth:
-    """A cloth, with this probability of two colours."""
+    """A random cloth, with this probability of two colours."""
     pattern: Pattern = "plain"
     if rng.random() < patterned:
         pattern = ("stripes", "check", "dots", "leaves", "zigzag")[int(rng.integers(5))]

@@ -1,4 +1,4 @@
-"""A kitchen's worktop with what is set into it: sink and tap, hob."""
+"""A kitchen's worktop with its inserts: sink and tap, hob."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ HOB = (0.58, 0.5)
 def worktop(
     coat: Material, low: tuple[float, float, float], high: tuple[float, float, float], basin: float | None
 ) -> list[Piece]:
-    """A slab, with a hole where a basin hangs, its middle at x = basin."""
+    """A slab with a hole for a basin, whose middle is at x = basin."""
     if basin is None:
         return [Piece("worktop", coat, block(low, high, 0.004))]
     (x0, y0, z0), (x1, y1, z1) = low, high

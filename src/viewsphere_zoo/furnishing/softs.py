@@ -1,4 +1,4 @@
-"""The soft parts of furniture: cushions, pillows, cloths that hang over furniture, tufted panels."""
+"""The soft parts of furniture: cushions, pillows, cloths draped over furniture, tufted panels."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def cushion(size: tuple[float, float, float], crown: float, rounding: float = 0.
 
 
 def upright(solid: Solid, at: ArrayLike, lean_deg: float) -> Solid:
-    """Return a solid at the origin put up on its edge: its y upwards, its top to the front (-Y), leaning to the rear."""
+    """Return a solid at the origin set on its edge: its y upwards, its top to the front (-Y), leaning to the rear."""
     return moved(turned(solid, 0, np.pi / 2 - np.radians(lean_deg)), at)
 
 
@@ -62,10 +62,10 @@ def draped(
     spacing: float = 0.09,
     floor: float = 0.03,
 ) -> Solid:
-    """A cloth that lies on a block and hangs over its sides.
+    """A cloth on a block, hanging over its sides.
 
-    cloth: low x, low y, high x, high y of the cloth spread out flat; block: the same of the block, its face at z = top; fold:
-    how far the folds of what hangs stand out, metres; floor: the least height of the hem.
+    cloth: low x, low y, high x, high y of the cloth spread out flat; block: the same bounds of the block, whose face is at z =
+    top; fold: how far the hanging folds stand out, metres; floor: the least height of the hem.
     """
     x0, y0, x1, y1 = cloth
     nx, ny = (max(4, round((b - a) / spacing)) for a, b in ((x0, x1), (y0, y1)))
@@ -88,7 +88,7 @@ def draped(
 
 
 def _creases(rng: np.random.Generator, flat: Float, depth: float = 0.006) -> Float:
-    """Soft creases of a cloth that lies, at most about 12 mm up or down."""
+    """Soft creases of a cloth that lies flat, at most about 12 mm up or down."""
     total = np.zeros(flat.shape[:2])
     for _ in range(5):
         turn, length = rng.uniform(0, np.pi), rng.uniform(0.22, 0.6)

@@ -16,7 +16,7 @@ BINDINGS: tuple[Color, ...] = (*DYES, (0.85, 0.8, 0.65), (0.75, 0.12, 0.1), (0.1
 
 
 def bound(k: int) -> Material:
-    """The cover of a book, by the number of its colour."""
+    """The material of a book's cover, by the number of its colour."""
     return Material(f"binding_{k}", linear(BINDINGS[k]), roughness=0.55)
 
 
@@ -30,7 +30,7 @@ def books(
     pages: list[Solid] = []
     tall, deep, run = tallest, min(depth, 0.22), 0
     while True:
-        if run == 0:  # books of a row come in sets of a like size
+        if run == 0:  # the books of a row come in sets of similar size
             tall, deep, run = (
                 tallest * rng.uniform(0.66, 1.0),
                 min(depth - 0.02, rng.uniform(0.14, 0.22)),

@@ -14,7 +14,7 @@ from viewsphere_zoo.shapes.solids import Solid, join, lathe
 
 
 def pedestal(coat: Material, top: float, wide: float, turned: bool) -> list[Piece]:
-    """A column on four feet if turned, else a stem that grows out of a round plate."""
+    """A column on four feet if turned, else a stem that rises from a round plate."""
     r = 0.3 * wide
     if not turned:
         neck = 0.035 + 0.02 * wide
@@ -70,7 +70,7 @@ def trestles(wood: Timber, top: float, width: float, depth: float, size: float) 
 
 
 def sleds(steel: Material, top: float, half: tuple[float, float], open_front: bool) -> list[Piece]:
-    """A closed frame of square tube at both ends, joined under the top; open_front: no rail where the sitter's knees are."""
+    """A closed frame of square tube at both ends, joined under the top; open_front: no rail at the sitter's knees."""
     (x, y), t = half, 0.022
     solids = []
     for s in (-1, 1):

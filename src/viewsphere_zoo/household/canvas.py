@@ -14,7 +14,7 @@ from viewsphere_zoo.shapes.solids import Float
 
 @dataclass(frozen=True, eq=False)
 class Canvas:
-    """A picture that is painted on: rgb (H, W, 3), sRGB 0..1; x, y (H, W), metres; pixel: its side, metres."""
+    """A picture to paint on: rgb (H, W, 3), sRGB 0..1; x, y (H, W), metres; pixel: its side, metres."""
 
     rgb: Float
     x: Float
@@ -32,7 +32,7 @@ class Canvas:
         self.rgb[:] = np.clip(self.rgb * factor[..., None], 0, 1)
 
     def window(self, low: tuple[float, float], high: tuple[float, float]) -> Canvas:
-        """The pixels between two corners, the same memory: painting there is quick."""
+        """The pixels between two corners as a view of the same memory, so that painting there is quick."""
         rows = np.flatnonzero((self.y[:, 0] > low[1]) & (self.y[:, 0] < high[1]))
         columns = np.flatnonzero((self.x[0] > low[0]) & (self.x[0] < high[0]))
         if not len(rows) or not len(columns):
@@ -61,13 +61,13 @@ def disc(c: Canvas, x: float, y: float, radius: float) -> Float:
 
 
 def ellipse(c: Canvas, x: float, y: float, half: tuple[float, float], turn: float = 0.0) -> Float:
-    """About the distance to an ellipse, its first half axis turned by radians."""
+    """The approximate distance to an ellipse whose first half axis is turned by this angle, radians."""
     u, v = np.cos(turn) * (c.x - x) + np.sin(turn) * (c.y - y), np.cos(turn) * (c.y - y) - np.sin(turn) * (c.x - x)
     return (np.hypot(u / half[0], v / half[1]) - 1) * min(half)
 
 
 def rect(c: Canvas, low: tuple[float, float], high: tuple[float, float], rounding: float = 0.0) -> Float:
-    """A rectangle between two corners, with rounded ones."""
+    """A rectangle between two corners, with rounded corners."""
     dx = np.abs(c.x - (low[0] + high[0]) / 2) - (high[0] - low[0]) / 2 + rounding
     dy = np.abs(c.y - (low[1] + high[1]) / 2) - (high[1] - low[1]) / 2 + rounding
     return np.hypot(np.maximum(dx, 0), np.maximum(dy, 0)) + np.minimum(np.maximum(dx, dy), 0) - rounding
@@ -93,7 +93,7 @@ def polygon(c: Canvas, corners: ArrayLike) -> Float:
 
 
 def leaf(c: Canvas, x: float, y: float, length: float, width: float, turn: float) -> Float:
-    """A lens from (x, y) along a direction, radians: where two discs overlap."""
+    """A lens from (x, y) along a direction, radians: the overlap of two discs."""
     r = (length * length / 4 + width * width / 4) / width
     ax, ay = x + np.cos(turn) * length / 2, y + np.sin(turn) * length / 2
     off = r - width / 2

@@ -1,4 +1,4 @@
-"""Cardboard and what is printed and stuck on it: arrows, a glass, words, hand holes, address labels."""
+"""Cardboard with prints and labels: arrows, a glass, words, hand holes, address labels."""
 
 from __future__ import annotations
 

@@ -12,7 +12,7 @@ from viewsphere.assets.mesh import Image, Material, Mesh, Texture
 from viewsphere_zoo.shapes.solids import Float
 
 Chart = Callable[[Float, Float], Float]
-"""Corners (T, 3, 3) and unit face normals (T, 3) of triangles to their uv (T, 3, 2)."""
+"""Maps corners (T, 3, 3) and unit face normals (T, 3) of triangles to their uv (T, 3, 2)."""
 
 
 def printed(name: str, image: int, roughness: float = 0.6, clearcoat: float = 0.0) -> Material:
@@ -53,7 +53,7 @@ def charted(mesh: Mesh, charts: Mapping[str, Chart], images: Sequence[Image]) ->
 
 
 def wound(low: float, high: float) -> Chart:
-    """Once around the z axis between two heights: the middle of the picture faces -Y."""
+    """A chart once around the z axis between two heights; the middle of the picture faces -Y."""
 
     def chart(corners: Float, _normals: Float) -> Float:
         u = np.arctan2(corners[..., 0], -corners[..., 1]) / (2 * np.pi) + 0.5
@@ -64,7 +64,7 @@ def wound(low: float, high: float) -> Chart:
 
 
 def flat(low: tuple[float, float], high: tuple[float, float], axes: tuple[int, int] = (0, 1)) -> Chart:
-    """Straight onto two axes, between two corners (lower left, upper right); a corner may be beyond the other."""
+    """A chart straight onto two axes, between two corners (lower left, upper right); swapped corners mirror it."""
 
     def chart(corners: Float, _normals: Float) -> Float:
         u, v = ((corners[..., axis] - low[k]) / (high[k] - low[k]) for k, axis in enumerate(axes))
@@ -74,7 +74,7 @@ def flat(low: tuple[float, float], high: tuple[float, float], axes: tuple[int, i
 
 
 def plane(corner: ArrayLike, across: ArrayLike, up: ArrayLike) -> Chart:
-    """Onto a rectangle anywhere: its lower left corner, and its edges to the right and up, (3,)."""
+    """A chart onto any rectangle: its lower left corner, and its edges to the right and up, (3,)."""
     origin, u, v = (np.asarray(p, np.float64) for p in (corner, across, up))
 
     def chart(corners: Float, _normals: Float) -> Float:
@@ -85,7 +85,7 @@ def plane(corner: ArrayLike, across: ArrayLike, up: ArrayLike) -> Chart:
 
 
 def sides(charts: Mapping[tuple[int, int], Chart]) -> Chart:
-    """Another chart for each side, (axis, sign) of the largest part of a triangle's normal; uv 0 on sides without one."""
+    """A chart for each side, (axis, sign) of the largest component of a triangle's normal; uv 0 on sides without a chart."""
 
     def chart(corners: Float, normals: Float) -> Float:
         axis = np.abs(normals).argmax(axis=1)

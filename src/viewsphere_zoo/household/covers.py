@@ -92,7 +92,7 @@ def _stripes(
 def _peaks(
     c: Canvas, x: float, y: float, w: float, h: float, colors: tuple[Color, Color, Color], rng: np.random.Generator
 ) -> None:
-    """Triangles, one before the other."""
+    """Triangles, one in front of the other."""
     for k in range(5):
         half, top, at = rng.uniform(0.2, 0.4) * w, rng.uniform(0.4, 0.9) * h, x + (0.15 + 0.17 * k) * w
         low, high = max(at - half, x), min(at + half, x + w)

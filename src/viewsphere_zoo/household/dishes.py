@@ -39,7 +39,7 @@ def wood(rng: np.random.Generator, color: Color) -> Image:
 
 
 def banded(radius: float, ground: Color, colors: Sequence[Color], bands: int, flowers: int = 0, start: float = 0.97) -> Image:
-    """A dish from above: rings near its edge, from a share of its radius inwards, and so many flowers between them."""
+    """A dish from above: rings near its edge, from a share of its radius inwards, with this number of flowers between them."""
     c = blank(2 * radius, 2 * radius, ground, 384)
     r = np.hypot(c.x - radius, c.y - radius)
     for k in range(bands):

@@ -11,17 +11,17 @@ T = TypeVar("T")
 
 
 def pick(rng: np.random.Generator, options: Sequence[T]) -> T:
-    """One of the options, all alike."""
+    """One of the options, with equal probability."""
     return options[int(rng.integers(len(options)))]
 
 
 def uniform(rng: np.random.Generator, low: float, high: float) -> float:
-    """A number between two, all alike."""
+    """A number between two bounds, uniformly distributed."""
     return float(rng.uniform(low, high))
 
 
 def chance(rng: np.random.Generator, share: float) -> bool:
-    """Return whether something happens that does in this share of all draws."""
+    """Return True with this probability."""
     return bool(rng.random() < share)
 
 

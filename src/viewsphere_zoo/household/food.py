@@ -16,7 +16,9 @@ from viewsphere_zoo.shapes.solids import Float, Solid, join, lathe, moved, tube,
 from viewsphere_zoo.townscape.foliage import blob, leaves
 
 Filling = Callable[[np.random.Generator, float, float], list[Piece]]
-"""Draws the pieces of what fills a vessel up to a level at which its radius inside is this, metres."""
+"""Draws the pieces of a filling, given the generator, the vessel's inner radius at the filling's level, and that level,
+metres.
+"""
 
 
 def _matter(name: str, color: Color, roughness: float = 0.5) -> Material:
@@ -24,7 +26,7 @@ def _matter(name: str, color: Color, roughness: float = 0.5) -> Material:
 
 
 def _spread(rng: np.random.Generator, count: int, radius: float) -> Float:
-    """Points (count, 2) evenly over a disc (a sunflower's), a little off."""
+    """Points (count, 2) spread evenly over a disc in a sunflower pattern, slightly jittered."""
     k = np.arange(count) + 0.5
     r, a = radius * np.sqrt(k / count), k * np.pi * (3 - 5**0.5) + rng.uniform(0, 6.3)
     return np.stack([r * np.cos(a), r * np.sin(a)], axis=1) + rng.normal(0, 0.06 * radius, (count, 2))

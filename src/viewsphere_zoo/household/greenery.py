@@ -1,4 +1,4 @@
-"""House plants above the soil: what grows out of a pot, habit by habit."""
+"""House plants above the soil, by habit."""
 
 from __future__ import annotations
 
@@ -108,7 +108,7 @@ def ficus(rng: np.random.Generator, bed: Bed) -> list[Piece]:
 def _along(
     rng: np.random.Generator, branch: Float, count: int, size: tuple[float, float], slim: float, outline: Outline
 ) -> list[Solid]:
-    """Leaves that leave a branch in turn."""
+    """Leaves that alternate along a branch."""
     yaw = rng.uniform(0, 6.3)
     leaves: list[Solid] = []
     for k in range(count):

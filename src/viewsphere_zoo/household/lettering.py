@@ -61,7 +61,7 @@ def length(text: str, height: float) -> float:
 
 
 def fitted(text: str, height: float, width: float) -> float:
-    """This height, or the largest at which the word has this width."""
+    """This height, or the largest at which the word fits this width."""
     return min(height, width / length(text, 1.0))
 
 

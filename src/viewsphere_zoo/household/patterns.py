@@ -1,4 +1,6 @@
-"""Decorations: stripes, dots, checks, leaves, waves, words. Each paints a canvas that closes around a vessel, left to right."""
+"""Decorations: stripes, dots, checks, leaves, waves, words. Each paints a canvas whose left and right edges meet around a
+vessel.
+"""
 
 from __future__ import annotations
 
@@ -89,7 +91,7 @@ def _sprig(c: Canvas, x: float, y: float, size: float, turn: float, colors: Sequ
 
 
 def hills(c: Canvas, colors: Sequence[Color], rng: np.random.Generator) -> None:
-    """Wavy layers, one before the other."""
+    """Wavy layers, one in front of the other."""
     w, h = extent(c)
     for k, color in enumerate(colors):
         n, m = int(rng.integers(2, 5)), int(rng.integers(5, 9))

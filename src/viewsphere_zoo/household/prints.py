@@ -1,4 +1,4 @@
-"""Labels of goods, without anybody's brand: a ground, a picture, words for what is inside, small print and a barcode."""
+"""Labels of goods without real brands: a ground, a picture, words for the contents, small print and a barcode."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ PAPER: Color = (0.93, 0.92, 0.88)
 
 @dataclass(frozen=True)
 class Label:
-    """The content of a label: its words, one of `PICTURES` and of `GROUNDS`; colours of ground, decoration, letters."""
+    """The content of a label: its words, one of `PICTURES` and one of `GROUNDS`; colours of ground, decoration, letters."""
 
     title: str
     line: str
@@ -38,7 +38,7 @@ def wrapper(c: Canvas, label: Label, rng: np.random.Generator) -> None:
 
 
 def face(c: Canvas, label: Label, x: float, rng: np.random.Generator) -> None:
-    """Picture and words around a line x; what leaves the canvas at one side comes in at the other."""
+    """Picture and words around a line x; shapes that leave the canvas at one side enter at the other."""
     w, h = extent(c)
     for at in (x, x + w):
         if at <= w:
@@ -96,7 +96,7 @@ def _wave(c: Canvas, colors: Sequence[Color], rng: np.random.Generator) -> None:
 
 
 def _slant(c: Canvas, colors: Sequence[Color], rng: np.random.Generator) -> None:
-    """Slanting stripes beyond a calm field."""
+    """Slanting stripes around a plain field."""
     w, h = extent(c)
     c.rgb[:] = colors[0]
     step = w / int(rng.integers(10, 18))

@@ -1,4 +1,4 @@
-"""Pictures that screens show: windows, an editor, a page, charts, a landscape; and the panel that shines with them."""
+"""Pictures that screens show: windows, an editor, a page, charts, a landscape; and the lit panel that shows them."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def _wallpaper(c: Canvas, rng: np.random.Generator) -> None:
 
 
 def _landscape(c: Canvas, rng: np.random.Generator) -> None:
-    """Mountains before a low sun."""
+    """Mountains in front of a low sun."""
     w, h = extent(c)
     share = np.clip(c.y / h, 0, 1)[..., None]
     c.rgb[:] = np.array((0.25, 0.45, 0.75)) * share + np.array((0.98, 0.75, 0.5)) * (1 - share)

@@ -65,7 +65,7 @@ def _striped(
 
 
 def _planks(rng: np.random.Generator, color: Color, rows: int = 10, size: int = 512) -> Image:
-    """Boards along the picture's width, each cut where its neighbours are not."""
+    """Boards along the picture's width, with staggered joints."""
     at = (np.arange(size) + 0.5) / size
     row = np.broadcast_to(np.floor(at[:, None] * rows).astype(np.int64), (size, size))
     cuts = rng.random(rows)

@@ -17,7 +17,7 @@ SIZES: dict[Kind, tuple[tuple[float, float], tuple[float, float]]] = {
     "kitchen": ((3.5, 4.8), (3.2, 4.2)),
     "office": ((3.3, 4.6), (3.1, 4.1)),
 }
-"""Least and most metres along x and along y."""
+"""Least and greatest length along x and along y, metres."""
 
 DOOR = (0.88, 2.03)
 """Width and height of doors inside, metres."""
@@ -41,7 +41,7 @@ PAINTS: tuple[Color, ...] = (
 
 
 def single(rng: np.random.Generator, kind: Kind | None = None) -> tuple[Room, ...]:
-    """One room of this kind, or of any, its middle at the origin: a window or two, and a door that is shut."""
+    """One room of this kind, or of any kind, its middle at the origin: one or two windows, and a shut door."""
     kind = kind or tuple(SIZES)[int(rng.integers(len(SIZES)))]
     x, y = (float(rng.uniform(*span)) for span in SIZES[kind])
     room = _covered(rng, Room(kind, (-x / 2, -y / 2), (x / 2, y / 2)))
@@ -54,7 +54,7 @@ def single(rng: np.random.Generator, kind: Kind | None = None) -> tuple[Room, ..
 
 
 def flat(rng: np.random.Generator) -> tuple[Room, ...]:
-    """A hall along x; living room and kitchen behind it, bedroom, office and perhaps another bedroom before it."""
+    """A hall along x; living room and kitchen behind it, bedroom, office and perhaps another bedroom in front of it."""
     front: list[Kind] = ["bedroom", "office", "bedroom"]
     front = front[: int(rng.integers(2, 4))]
     rear: list[Kind] = ["living_room", "kitchen"]
@@ -82,7 +82,7 @@ def flat(rng: np.random.Generator) -> tuple[Room, ...]:
 
 
 def _joined(rng: np.random.Generator, room: Room, hall: Room, side: Side) -> tuple[Room, Opening]:
-    """A room on this side of the hall with its window and the door to the hall, and the same door's hole in the hall's wall."""
+    """A room on this side of the hall with its window and the door to the hall, and that door's opening in the hall's wall."""
     to_hall: Side = "front" if side == "rear" else "rear"
     hinge = 1 if rng.random() < 0.5 else -1
     x = hinge * (room.length(to_hall) / 2 - DOOR[0] / 2 - 0.14)
@@ -92,7 +92,7 @@ def _joined(rng: np.random.Generator, room: Room, hall: Room, side: Side) -> tup
 
 
 def _window(rng: np.random.Generator, room: Room, side: Side) -> Opening:
-    """A window in the middle of a wall, or a little beside it."""
+    """A window in or near the middle of a wall."""
     most = min(2.6, room.length(side) - 1.2)
     width = float(rng.uniform(0.45, 1.0)) * most
     foot = 1.05 if room.kind == "kitchen" else float(rng.choice((0.25, 0.85, 0.9)))
@@ -102,7 +102,7 @@ def _window(rng: np.random.Generator, room: Room, side: Side) -> Opening:
 
 
 def _covered(rng: np.random.Generator, room: Room) -> Room:
-    """The room with a floor and walls as its kind has them."""
+    """The room with the floor and walls of its kind."""
     found: dict[Kind, Sequence[FloorKind]] = {
         "living_room": ("planks", "parquet", "carpet"),
         "bedroom": ("carpet", "planks", "parquet"),

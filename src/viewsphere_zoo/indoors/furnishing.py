@@ -1,4 +1,4 @@
-"""Furniture finds its spots in a room: against walls, beside, before and on other furniture, clear of doors and windows."""
+"""Placement of furniture in a room: against walls, beside, in front of and on other furniture, clear of doors and windows."""
 
 from __future__ import annotations
 
@@ -16,28 +16,28 @@ from viewsphere_zoo import family as zoo_family
 from viewsphere_zoo.indoors.plan import SIDES, Room, Side
 
 DRAWS = 400
-"""Members of a family that are drawn until one is as it is wanted."""
+"""Members of a family to draw until one meets the test."""
 
 STANDOFF = 0.9
-"""Metres between the free floor and the walls, for cameras."""
+"""Distance between the free floor and the walls, as room for cameras, metres."""
 
 SEATED = 0.7
-"""Metres around a table that who sits there needs, towards other furniture."""
+"""Space around a table for seated people, up to other furniture, metres."""
 
 SPOTS = 30
-"""Spots that are tried for a small thing on a surface."""
+"""Number of spots to try for a small thing on a surface."""
 
 FACING = ("book", "laptop", "monitor", "television")
-"""Small things that people turn to themselves."""
+"""Small things that face their user."""
 
 LAYER = 0.25
-"""Metres between two boards of a shelf, at least."""
+"""Least distance between two boards of a shelf, metres."""
 
 STEP = 0.05
-"""Metres between spots that are tried along a wall."""
+"""Distance between the spots to try along a wall, metres."""
 
 SWING, DRAPE, SIGHT = 0.95, 0.2, 0.7
-"""Depth into the room, metres, of the floor that doors need, of curtains and radiators, and of free space before windows."""
+"""Depth into the room, metres: of the floor for doors, of curtains and radiators, and of the free space at windows."""
 
 Rectangle = tuple[float, float, float, float]
 """Lowest x and y, highest x and y."""
@@ -47,7 +47,7 @@ Fits = Callable[[Any], bool]
 
 @dataclass(frozen=True)
 class Stand:
-    """A family's member and where it stands: its origin, and how far it is turned counter-clockwise."""
+    """A family's member with its place: its origin, and its counter-clockwise turn."""
 
     family: str
     seed: int
@@ -71,18 +71,20 @@ class Stand:
         return self.x - a, self.y - b, self.x + a, self.y + b
 
     def at(self, right: float, ahead: float) -> tuple[float, float]:
-        """The point so far to the right of the member's middle and before its front, as one sees it who faces its front."""
+        """The point this far to the right of the member's middle, seen by a viewer facing its front, and this far ahead of
+        it.
+        """
         c, s = math.cos(math.radians(self.turn_deg)), math.sin(math.radians(self.turn_deg))
         return self.x + right * c + ahead * s, self.y + right * s - ahead * c
 
     def surfaces(self) -> tuple[LevelFace, ...]:
-        """The level faces on which things stand, in the member's axes."""
+        """The level faces for things to stand on, in the member's axes."""
         found = zoo_family(self.family).surfaces
         return () if found is None else found(self.parameters)
 
 
 def extent(parameters: Any) -> tuple[float, float, float]:
-    """Width, depth and height of a family's member, metres, by its parameters: its `extent`, or the measures that it has."""
+    """Width, depth and height of a family's member, metres, from its parameters: its `extent`, or its single measures."""
     own: tuple[float, float, float] | None = getattr(parameters, "extent", None)
     if own is not None:
         return own
@@ -91,25 +93,25 @@ def extent(parameters: Any) -> tuple[float, float, float]:
 
 
 def across(turn_deg: float) -> Side:
-    """The side of the room that one looks at whose back is to the wall, turned so."""
+    """The side of the room that furniture with this turn faces, its back to the wall."""
     return SIDES[(round(-turn_deg / 90) + 2) % 4]
 
 
 def overlap(a: Rectangle, b: Rectangle, gap: float = 0.0) -> bool:
-    """Return whether two rectangles are nearer than `gap`, or in one another."""
+    """Return whether two rectangles overlap or are nearer than `gap`."""
     return a[0] < b[2] + gap and b[0] < a[2] + gap and a[1] < b[3] + gap and b[1] < a[3] + gap
 
 
 @dataclass(eq=False)
 class Furnishing:
-    """A room that fills up: what stands in it, and what of its floor has to stay free."""
+    """A room being furnished: its furniture, and the floor areas to keep free."""
 
     room: Room
     rng: np.random.Generator
     stands: list[Stand] = field(default_factory=list[Stand])
 
     def design(self, family: str, fits: Fits = lambda p: True) -> tuple[int, Any] | None:
-        """A seed of the family and the parameters that it draws, which are as they are wanted; None where none is found."""
+        """A seed of the family and the parameters drawn from it that meet the test; None if no seed does."""
         draw = drawing_of(family)
         for _ in range(DRAWS):
             seed = int(self.rng.integers(1 << 31))
@@ -120,7 +122,9 @@ class Furnishing:
     def against(
         self, family: str, fits: Fits = lambda p: True, sides: Iterable[Side] = SIDES, middle: bool = False, gap: float = 0.03
     ) -> Stand | None:
-        """Its back against a wall, one of those with the most room first; `middle`: as near to the wall's middle as can be."""
+        """Place a member with its back against a wall, walls with the most room first; `middle`: as near to the wall's middle
+        as possible.
+        """
         found = self.design(family, fits)
         if found is None:
             return None
@@ -134,7 +138,7 @@ class Furnishing:
         return None
 
     def beside(self, other: Stand, right: int, family: str, fits: Fits = lambda p: True, gap: float = 0.06) -> Stand | None:
-        """Beside what stands there, at its right (1) or left (-1), its back on the same line."""
+        """Place a member beside another one, at its right (1) or left (-1), with its back on the same line."""
         found = self.design(family, fits)
         if found is None:
             return None
@@ -145,7 +149,9 @@ class Furnishing:
     def before(
         self, other: Stand, family: str, fits: Fits = lambda p: True, gap: float = 0.4, right: float = 0.0, turn: float = 180.0
     ) -> Stand | None:
-        """Before what stands there, turned by `turn` against it (180: face to face); a gap below 0 pushes it under."""
+        """Place a member in front of another one, turned by `turn` against it (180: face to face); a gap below 0 pushes it
+        under.
+        """
         found = self.design(family, fits)
         if found is None:
             return None
@@ -154,7 +160,7 @@ class Furnishing:
         return self._try(Stand(family, seed, p, x, y, (other.turn_deg + turn) % 360), around=other if gap < 0 else None)
 
     def around(self, table: Stand, family: str, fits: Fits, count: int, tuck: float = 0.12) -> None:
-        """So many of one design around a table, facing it, a little askew; as many as there is room for."""
+        """Place up to this many members of one design around a table, facing it, a little askew; fewer if there is no room."""
         found = self.design(family, fits)
         if found is None:
             return
@@ -169,7 +175,7 @@ class Furnishing:
             self._try(Stand(family, seed, p, x, y, table.turn_deg + turn + askew), around=table)
 
     def in_the_middle(self, family: str, fits: Fits = lambda p: True) -> Stand | None:
-        """As near to the room's middle as there is room for it and for who sits around it."""
+        """Place a member as near to the room's middle as possible, with room for people seated around it."""
         found = self.design(family, fits)
         if found is None:
             return None
@@ -200,8 +206,8 @@ class Furnishing:
         return made
 
     def scattered(self, other: Stand, name: str, families: Sequence[str], count: int, gap: float = 0.02) -> None:
-        """So many small things of these families on a surface of what stands there, turned at random, clear of one another and
-        of what is on it; fewer where there is no room.
+        """Place small things of these families on a surface of a member, turned at random, clear of one another and of the
+        things already there; fewer if there is no room.
         """
         for surface in other.surfaces():
             if surface.name.startswith(name):
@@ -230,7 +236,7 @@ class Furnishing:
                 return
 
     def under(self, middle: tuple[float, float], turn: float, family: str, fits: Fits = lambda p: True) -> Stand | None:
-        """On the floor under other furniture, as a rug lies; None where it would not lie flat in the room."""
+        """Place a rug on the floor under other furniture; None if it would not lie flat in the room."""
         found = self.design(family, fits)
         if found is None:
             return None
@@ -241,8 +247,8 @@ class Furnishing:
         return made
 
     def free(self, least: float) -> Rectangle | None:
-        """The square of the floor, at least this wide, that is farthest from furniture, and as far from walls as cameras need;
-        None where there is none.
+        """The floor square, at least this wide, that is farthest from furniture and far enough from walls for cameras; None
+        without such a square.
         """
         (x0, y0), (x1, y1) = self.room.low, self.room.high
         x, y = np.arange(x0 + 0.1, x1, 0.1), np.arange(y0 + 0.1, y1, 0.1)
@@ -258,7 +264,7 @@ class Furnishing:
         return None if 2 * half < least else (a - half, b - half, a + half, b + half)
 
     def _sides(self, sides: Iterable[Side]) -> list[Side]:
-        """The sides in a random order, those where nothing opens first."""
+        """The sides in a random order, sides without openings first."""
         chance: dict[Side, float] = {side: float(self.rng.random()) for side in sides}
         return sorted(chance, key=lambda side: (len(self.room.of(side)), chance[side]))
 
@@ -287,8 +293,8 @@ class Furnishing:
         return own[0] > x0 + 0.005 and own[1] > y0 + 0.005 and own[2] < x1 - 0.005 and own[3] < y1 - 0.005
 
     def _is_free(self, made: Stand, around: Stand | None = None) -> bool:
-        """Return whether there is room for a member, off doors, windows and what stands there, but for what it stands
-        `around`.
+        """Return whether there is room for a member, clear of doors, windows and furniture, except the furniture that it
+        stands `around`.
         """
         own = made.rectangle
         if not self._inside(own) or any(overlap(own, other) for other in self._doors() + self._windows(made.size[2])):
@@ -306,7 +312,7 @@ class Furnishing:
         return low + [self._before(o.side, o.span, SIGHT) for o in found if height > o.foot + 0.15]
 
     def _before(self, side: Side, span: tuple[float, float], deep: float) -> Rectangle:
-        """The floor before a part of a wall."""
+        """The floor in front of a part of a wall."""
         wall = Stand("", 0, None, *self.room.middle(side), -90.0 * SIDES.index(side))
         corners: Sequence[tuple[float, float]] = [wall.at(t, a) for t in span for a in (0.0, deep)]
         xs, ys = zip(*corners, strict=True)

@@ -20,7 +20,7 @@ def furnished(room: Room, rng: np.random.Generator) -> Furnishing:
 
 
 def _style(*styles: str, width: float = math.inf, depth: float = math.inf, height: float = math.inf) -> Fits:
-    """Return whether a member is of one of these styles (any, without one), and no wider, deeper or higher than that."""
+    """Return a test for members of one of these styles (any style if none is given) within these dimensions."""
 
     def fits(p: Any) -> bool:
         own = extent(p)
@@ -56,7 +56,7 @@ def _bedroom(f: Furnishing) -> None:
 
 
 def _living_room(f: Furnishing) -> None:
-    """A sofa that looks at the television over a low table on a rug; an armchair, a lamp, shelves and plants."""
+    """A sofa facing the television across a low table on a rug; an armchair, a lamp, shelves and plants."""
     widest = 0.6 * max(f.room.size)
     sofa = f.against("sofa", lambda p: p.chaise == "none" and p.width < widest, middle=True)
     if sofa is not None:
@@ -92,7 +92,7 @@ def _kitchen(f: Furnishing) -> None:
 
 
 def _office(f: Furnishing) -> None:
-    """A desk with a screen and a chair before it; shelves, a cabinet, a plant."""
+    """A desk with a screen, and a chair in front of it; shelves, a cabinet, a plant."""
     desk = f.against("table", _style("desk"), middle=bool(f.rng.random() < 0.5))
     if desk is not None:
         f.before(desk, "chair", _seat("Office"), gap=-0.15)
@@ -105,7 +105,7 @@ def _office(f: Furnishing) -> None:
 
 
 def _hall(f: Furnishing) -> None:
-    """Something narrow along the wall."""
+    """A narrow piece of furniture along the wall."""
     _topped(f, f.against("cabinet", _style("sideboard", "chest", depth=0.42)))
 
 

@@ -1,4 +1,4 @@
-"""Windows, doors and what belongs to them, on the wall y = 0 that faces -Y; a hole's foot is z = 0, its middle x = 0."""
+"""Windows, doors and their fittings on the wall y = 0 that faces -Y; a hole's foot is at z = 0, its middle at x = 0."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class Joinery:
 
 
 def window(o: Opening, j: Joinery, deep: float, rng: np.random.Generator) -> list[Piece]:
-    """Frame, sill, radiator and curtains; `deep`: the wall's thickness. No pane: what is outside is seen as it is."""
+    """Frame, sill, radiator and curtains; `deep`: the wall's thickness. There is no pane, so the outside is seen directly."""
     w, h = o.width, o.height
     near, far = 0.5 * deep, 0.5 * deep + 0.07
     casements = max(1, round(w / 0.9))
@@ -115,7 +115,7 @@ def door(o: Opening, j: Joinery, is_open: bool) -> list[Piece]:
 
 
 def trimmed(o: Opening, j: Joinery) -> list[Piece]:
-    """Only the boards around a hole, as they are seen from the room that the door does not open into."""
+    """Only the boards around a hole, for the room that the door does not open into."""
     return [piece for piece in door(o, j, False) if piece.part == "door_frame"]
 
 

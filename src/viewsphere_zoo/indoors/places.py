@@ -1,4 +1,4 @@
-"""From furnished rooms to places: pieces around the free floor of one of the rooms."""
+"""Places made of furnished rooms: pieces around the free floor of one of the rooms."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ from viewsphere_zoo.indoors.furnishing import Rectangle, Stand
 from viewsphere_zoo.indoors.habits import furnished
 
 TRIES = 60
-"""Interiors that are furnished until one leaves enough of its floor free."""
+"""Number of interiors to try until one leaves enough of its floor free."""
 
 LEAST = 1.1
 """Width of the free floor around the origin, metres, at least."""
 
 
 def drawn(rng: np.random.Generator, wanted: Callable[[Interior], bool]) -> tuple[int, Interior]:
-    """A seed of an interior that is as it is wanted, and its parameters."""
+    """A seed of an interior that meets the test, and its parameters."""
     draw = drawing_of("interior")
     while True:
         seed = int(rng.integers(1 << 31))
@@ -44,7 +44,7 @@ def around_free_floor(rng: np.random.Generator, wanted: Callable[[Interior], boo
 
 
 def laid_out(seed: int, stands: Sequence[Stand], free: Rectangle, z: float = 0.0) -> Place:
-    """The interior of this seed with what stands in it; the origin is in the middle of what is free, at this height."""
+    """The interior of this seed with its furniture; the origin is in the middle of the free area, at this height."""
     x, y = (free[0] + free[2]) / 2, (free[1] + free[3]) / 2
     count: Counter[str] = Counter()
     pieces = [PlacePiece("interior_1", "interior", seed, "interior", standing(-x, -y, 0.0, -z))]
@@ -57,8 +57,8 @@ def laid_out(seed: int, stands: Sequence[Stand], free: Rectangle, z: float = 0.0
 
 
 def _surfaces(stands: Sequence[Stand], origin: tuple[float, float, float]) -> Iterator[Surface]:
-    """The level faces of furniture where things may stand, in the axes of this origin: the first face of the first table is
-    `table`, its others are `table_shelf`, ..., those of the second table `table_2`, `table_2_shelf`.
+    """The level faces of furniture for things to stand on, in the axes of this origin. The first table's first face is
+    `table`, its other faces are `table_shelf`, ...; the second table's are `table_2`, `table_2_shelf`.
     """
     count: Counter[str] = Counter()
     for stand in (s for s in stands if s.z == 0):

@@ -1,4 +1,4 @@
-"""Plans of interiors: rooms, their walls, and what opens in the walls; metres."""
+"""Plans of interiors: rooms, their walls, and the openings in the walls; metres."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ RIGHT: dict[Side, tuple[int, int]] = {"rear": (1, 0), "right": (0, -1), "front":
 """Direction to a wall's right as seen from the room, x and y."""
 
 INNER, OUTER = 0.12, 0.32
-"""Thickness of walls between two rooms, and of those to the outside."""
+"""Thickness of walls between two rooms, and of outside walls."""
 
 Opens = Literal["window", "door", "doorway", "entrance"]
 
 
 @dataclass(frozen=True)
 class Opening:
-    """A hole in a wall as it is seen from the room: its middle along the wall, to the right of the wall's own, and its size.
+    """A hole in a wall as seen from the room: the offset of its middle to the right of the wall's middle, and its size.
 
     window: to the outside; door: to another room, its open leaf hangs in this room, at the hinge's side (-1 left, 1 right);
     doorway: the same hole seen from the other room; entrance: a door that is shut, behind which nothing is shown.
@@ -40,13 +40,15 @@ class Opening:
 
     @property
     def span(self) -> tuple[float, float]:
-        """From where to where along the wall."""
+        """Start and end along the wall."""
         return self.x - self.width / 2, self.x + self.width / 2
 
 
 @dataclass(frozen=True)
 class Room:
-    """One room: lowest x and y and highest x and y of its floor, what opens in its walls, what covers its walls and floor."""
+    """One room: lowest x and y and highest x and y of its floor, the openings in its walls, the coverings of walls and
+    floor.
+    """
 
     kind: Kind
     low: tuple[float, float]
@@ -57,11 +59,11 @@ class Room:
 
     @property
     def size(self) -> tuple[float, float]:
-        """Along x and along y."""
+        """Size along x and along y."""
         return self.high[0] - self.low[0], self.high[1] - self.low[1]
 
     def length(self, side: Side) -> float:
-        """Of a wall."""
+        """Length of a wall."""
         return self.size[0] if side in ("rear", "front") else self.size[1]
 
     def middle(self, side: Side) -> tuple[float, float]:

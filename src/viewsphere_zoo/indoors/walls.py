@@ -37,7 +37,7 @@ def wall(length: float, height: float, openings: Sequence[Opening], reveal: floa
 
 
 def skirting(length: float, openings: Sequence[Opening], trim: float) -> Solid:
-    """Boards along the wall's foot, which leave out doors and their trim."""
+    """Boards along the wall's foot, interrupted at doors and their trim."""
     out, high = SKIRTING
     doors = sorted((o.span[0] - trim, o.span[1] + trim) for o in openings if o.foot <= 0)
     ends = [-length / 2, *(edge for span in doors for edge in span), length / 2]
@@ -46,7 +46,7 @@ def skirting(length: float, openings: Sequence[Opening], trim: float) -> Solid:
 
 
 def level(low: Sequence[float], high: Sequence[float], z: float, faces_up: bool = True) -> Solid:
-    """A level rectangle that is seen from above, or from below."""
+    """A level rectangle that faces up or down."""
     corners: Float = np.array(
         [(low[0], low[1], z), (high[0], low[1], z), (high[0], high[1], z), (low[0], high[1], z)], np.float64
     )

@@ -35,7 +35,7 @@ Feet = Literal["tapered", "block", "bun", "metal"]
 class Armchair:
     """Parameters of an armchair; lengths in metres.
 
-    body: straight, rolled or sloping arms, a wing chair, a tub whose back runs on into its arms, or a wooden frame; arm: an
+    body: straight, rolled or sloping arms, a wing chair, a tub whose back continues into its arms, or a wooden frame; arm: an
     arm's thickness; arm_height: height of its top; lean: run of the back to the rear per metre; buttons: columns of tufts in
     the back.
     """
@@ -161,7 +161,7 @@ def _rolled(p: Armchair, low: float, front: float, rear: float) -> tuple[Solid, 
     foot = np.array([(p.inner - 0.01, low), (wall, low), (wall, (low + cz) / 2)])
     xz = np.vstack([foot, roll, [(p.inner - 0.01, (low + cz) / 2)]])[::-1]
     y = np.array([front, front, front + 0.006, front + 0.02, *np.linspace(front + 0.08, rear, 6), rear])
-    heart = np.array([wall - 0.012, cz - 0.06])  # a point from which all of the outline can be seen
+    heart = np.array([wall - 0.012, cz - 0.06])  # a point from which the whole outline is visible
     size = np.array([0, 0.93, 0.975, 1, *np.ones(6), 0])[:, None, None]
     plan = heart + (xz - heart) * size
     rings = np.dstack([plan[..., 0], np.broadcast_to(y[:, None], plan.shape[:2]), plan[..., 1]])
@@ -177,7 +177,7 @@ def _back_surface(p: Armchair) -> Surface:
 
 
 def _back(p: Armchair) -> list[Piece]:
-    """The back, tufted or with a loose cushion before it, and wings."""
+    """The back, tufted or with a loose cushion in front of it, and wings."""
     surface, rise = _back_surface(p), np.sqrt(1 + p.lean**2)
     span = (p.height - p.seat_height + 0.13) * rise - 0.02
     x = p.width / 2 - (0.012 if p.body != "wing" else 0.05)

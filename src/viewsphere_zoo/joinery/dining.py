@@ -1,4 +1,4 @@
-"""Dining chairs with four posts: the rear legs go up into the back."""
+"""Dining chairs with four posts: the rear legs continue up into the back."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class Dining:
     """Parameters of a wooden dining chair; lengths in metres.
 
     width: of the seat at its front; taper: the seat's width at its rear as a fraction of `width`; rungs: slats or rungs in the
-    back; rake: how far the top of the back lies behind its foot; hollow: how far the middle of the rails bows to the rear;
+    back; rake: how far the top of the back is behind its foot; hollow: how far the middle of the rails bows to the rear;
     arch: rise of the crest rail in its middle; cover: of a padded seat or back.
     """
 
@@ -182,7 +182,7 @@ def _stretchers(p: Dining, wood: tuple[Material, ...]) -> list[Piece]:
     low, high = 0.13, 0.2
 
     def rail(a: ArrayLike, b: ArrayLike) -> list[Piece]:
-        """A rail between two points: turned where the legs are turned, else sawn."""
+        """A rail between two points: turned if the legs are turned, else sawn."""
         if p.legs == "turned":
             return [
                 Piece("stretcher", wood[0], spindle(a, b, [(0, 0.008), (0.3, 0.011), (0.5, 0.015), (0.7, 0.011), (1, 0.008)]))

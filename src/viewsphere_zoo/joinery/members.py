@@ -77,7 +77,7 @@ def bend(points: ArrayLike, radius: float, steps: int = 6, closed: bool = False)
 
 
 def dense(path: Float, spacing: float, closed: bool = False) -> Float:
-    """The path with further points such that neighbours lie at most `spacing` apart."""
+    """The path with further points such that neighbours are at most `spacing` apart."""
     ends = np.roll(path, -1, axis=0) if closed else np.vstack([path[1:], path[-1:]])
     pieces = [
         a + (b - a) * np.arange(n)[:, None] / n

@@ -12,7 +12,7 @@ from viewsphere_zoo.shapes.panels import Surface, raised
 from viewsphere_zoo.shapes.solids import Float, Solid, flipped, grid, join
 
 Height = Callable[[Float, Float], Float]
-"""Heights over arrays x, y of one shape, metres."""
+"""Maps arrays x, y of one shape to heights, metres."""
 
 
 def polygon(corners: ArrayLike, radius: float, spacing: float = 0.03) -> Float:
@@ -34,7 +34,7 @@ def level(height: float) -> Height:
 
 
 def crowned(outline: Float, height: float, crown: float) -> Height:
-    """A face at this height on the border that rises by `crown` in the middle."""
+    """A face that is at this height on the border and rises by `crown` in the middle."""
     middle, half = (outline.max(axis=0) + outline.min(axis=0)) / 2, np.ptp(outline, axis=0) / 2
 
     def face(x: Float, y: Float) -> Float:
@@ -72,7 +72,7 @@ def seam(outline: Float, face: Height, rounding: float, radius: float = 0.004, u
 
 
 def cushion(outline: Float, thickness: float, crown: float, rounding: float, rings: int = 7) -> tuple[Solid, Solid]:
-    """A loose cushion that stands on z = 0 on its border and bulges on both faces; the second solid is its piping."""
+    """A loose cushion whose border touches z = 0 and whose faces both bulge; the second solid is its piping."""
     top, bottom = crowned(outline, thickness, crown), crowned(outline, 0.0, -0.3 * crown)
     pipings = join(seam(outline, top, rounding), seam(outline, bottom, rounding, up=False))
     return slab(outline, bottom, top, rounding, rings), pipings

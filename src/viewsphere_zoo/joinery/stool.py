@@ -151,7 +151,7 @@ def _wooden(p: Stool) -> list[Piece]:
 
 
 def _steel(p: Stool) -> list[Piece]:
-    """Bent tubes and a ring to put the feet on."""
+    """Bent tubes and a foot ring."""
     foot, top = _corners(p)
     tubes = []
     for k in (0, 1):
@@ -256,7 +256,7 @@ def _back(p: Stool) -> list[Piece]:
 
 
 def draw(rng: np.random.Generator) -> Stool:
-    """A random stool: two in three for a bar."""
+    """A random stool; two in three are bar stools."""
     base: Base = ("wood", "steel", "three", "column")[int(rng.choice(4, p=(0.34, 0.28, 0.12, 0.26)))]
     high = base == "column" or rng.random() < 0.62
     seat: Seat = (

@@ -1,4 +1,4 @@
-"""Chairs whose legs and back both stand in the seat: Windsor chairs, and moulded shells on four legs."""
+"""Chairs whose legs and back are both fixed into the seat: Windsor chairs, and moulded shells on four legs."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _STICK = ((0.0, 0.0062), (0.3, 0.0085), (0.6, 0.007), (1.0, 0.005))
 class Windsor:
     """Parameters of a spindle-back chair; lengths in metres.
 
-    back: a comb under a curved crest rail, or a bow around the spindles; rake: how far the top lies behind the seat;
+    back: a comb under a curved crest rail, or a bow around the spindles; rake: how far the top is behind the seat;
     splay: run of the legs per metre of height.
     """
 

@@ -14,7 +14,7 @@ from viewsphere_zoo.shapes.solids import Solid, both_sides, join, lathe, mirrore
 
 
 def body_pieces(p: Motorcycle, c: Coats) -> list[Piece]:
-    """Return the bodywork of a motorcycle that is no scooter."""
+    """Return the bodywork of a motorcycle other than a scooter."""
     pieces = [*_tank(p, c), *_seat(p, c), *_tail(p, c)]
     if p.style == "sport":
         pieces += _fairing(p, c)

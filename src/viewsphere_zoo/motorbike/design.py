@@ -21,7 +21,7 @@ class Motorcycle:
 
     wheelbase: between the axles; rake: of the fork from the vertical; fork: its length; radius, tyre (front, rear): of the
     wheels and their tyres' widths; spokes: of a cast wheel, 0 for wire; seat: its height; bar (width, rise): of the handlebar,
-    pull: how far back its grips lie; screen: height of a windscreen, 0 for none; steering: the bar's turn to the left.
+    pull: how far back its grips are; screen: height of a windscreen, 0 for none; steering: the bar's turn to the left.
     """
 
     style: Style = "naked"

@@ -55,7 +55,7 @@ def _line(p: Motorcycle) -> Float:
 
 
 def _shield(p: Motorcycle, c: Coats) -> list[Piece]:
-    """A bowed sheet before the knees, and the floor behind it."""
+    """A bowed sheet in front of the knees, and the floor behind it."""
     line = _line(p)
     t = np.linspace(0, 1, 11)
     y, z = (np.interp(t, np.linspace(0, 1, 4), line[:, k]) for k in (0, 1))

@@ -79,7 +79,9 @@ def guard(at: Float, radius: float, width: float, start: float, stop: float) -> 
 
 
 def swing_arm(p: Motorcycle, pivot: Float, c: Coats) -> list[Piece]:
-    """Two arms to the rear axle, a chain beside one, and twin shocks unless the style hides one in its middle."""
+    """Two arms to the rear axle, a chain beside one of them, and twin shocks unless the style hides a single one in the
+    middle.
+    """
     rear = p.rear_axle
     x = p.tyre[1] / 2 + 0.035
     arm = tube(

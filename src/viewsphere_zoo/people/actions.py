@@ -1,9 +1,9 @@
 """The actions of people, as clips: walk, run, stand, sit. Legs follow the feet, so feet on the ground do not slide.
 
-A foot's path over a stride is in the person's own axes, in which the ground moves backwards evenly. The foot comes down on the
-heel, is flat, rises on the ball, and moves forward through the air; hip and knee follow by inverse kinematics. Spans and angles
-are about those of normal gait (Winter 1991, Biomechanics and Motor Control of Human Gait; Perry and Burnfield 2010, Gait
-Analysis).
+A foot's path over a stride is in the person's own axes, in which the ground moves backwards at a constant speed. The foot
+lands on the heel, lies flat, rises on the ball, and moves forward through the air. Hip and knee follow by inverse kinematics.
+Durations and angles approximate normal gait (Winter 1991, Biomechanics and Motor Control of Human Gait; Perry and Burnfield
+2010, Gait Analysis).
 """
 
 from __future__ import annotations
@@ -19,13 +19,13 @@ from viewsphere_zoo.people.skeleton import JOINTS, Skeleton
 from viewsphere_zoo.shapes.solids import Float
 
 RATE = 60
-"""Keys a second: every instant of 60, 30, 20, 15, 12 or 10 pictures a second has one."""
+"""Keys per second: every frame time at 60, 30, 20, 15, 12 or 10 frames per second has a key."""
 
 SPEEDS = {"walk": 1.25, "run": 3.0}
-"""Metres a second at which feet do not slide, whoever walks or runs."""
+"""Speeds at which feet do not slide for any person, metres per second."""
 
 FITTED = 24
-"""Phases of a stride at which legs are seen to reach the ground."""
+"""Number of phases of a stride at which legs are checked to reach the ground."""
 
 SEAT = 0.45
 """Height of the chair that people sit on, metres."""
@@ -34,8 +34,8 @@ SEAT = 0.45
 @dataclass(frozen=True)
 class Manner:
     """The manner of a person's movement: `swing` of the arms and `lively`, both about 1.
-    `stance`: half of the distance between the feet, as a share of that between the hips; `lean` of the trunk, degrees.
-    `phase` 0 to 1: the time in a stride of a still picture.
+    `stance`: half the distance between the feet, as a share of the distance between the hips; `lean` of the trunk, degrees.
+    `phase` 0 to 1: the position of a still pose within the stride.
     """
 
     swing: float = 1.0
@@ -47,9 +47,9 @@ class Manner:
 
 @dataclass(frozen=True)
 class Gait:
-    """A stride: metres a second, its seconds, the share of it that a foot is on the ground, degrees that the foot is raised as
-    it comes down and as it leaves, by how much it is lifted on its way (share of the leg), how deep the pelvis hangs (of
-    the leg), its rise and fall (metres), degrees that arms swing to either side, that elbows bend and that the trunk leans.
+    """A stride: speed in metres per second, duration in seconds, share of it with the foot on the ground. Then the foot's
+    pitch at landing and at lift-off, degrees; its lift on the way (share of the leg); the pelvis' drop (share of the leg), and
+    its rise and fall, metres. Last the arms' swing to either side, the elbows' bend and the trunk's lean, degrees.
     """
 
     speed: float
@@ -66,19 +66,19 @@ class Gait:
 
 
 def gait(name: str, leg: float) -> Gait:
-    """A walk or a run of someone whose legs are so long, metres; longer legs take longer strides."""
+    """A walk or a run for legs of this length, metres; longer legs take longer strides."""
     if name == "walk":
         return Gait(SPEEDS["walk"], _frames(1.03 * (leg / 0.83) ** 0.5), 0.61, 20, 50, 0.115, 0.020, 0.016, 22, 14, 2.0)
     return Gait(SPEEDS["run"], _frames(0.70 * (leg / 0.83) ** 0.5), 0.36, 4, 62, 0.40, 0.050, -0.032, 36, 82, 8.0)
 
 
 def _frames(seconds: float) -> float:
-    """Whole frames, so that a stride's end is its beginning."""
+    """The number of whole frames in a stride, so that its end matches its beginning."""
     return round(seconds * RATE) / RATE
 
 
 def clips(s: Skeleton, manner: Manner) -> dict[str, Clip]:
-    """The clips of a person. Those that move forward do so on the spot, and say their speed."""
+    """The clips of a person. Walking and running clips stay on the spot and record their speed."""
     leg = float(s["L_Hip"][2] - s["L_Ankle"][2])
     found = dict[str, Clip]()
     for name in ("walk", "run"):
@@ -94,7 +94,7 @@ def clips(s: Skeleton, manner: Manner) -> dict[str, Clip]:
 
 
 def _reaching(s: Skeleton, manner: Manner, g: Gait, phases: Sequence[float]) -> tuple[Pose, ...]:
-    """The poses of a stride, whose pelvis hangs as deep as legs need to reach the ground."""
+    """The poses of a stride, with the pelvis lowered until the legs reach the ground."""
     looked_at = [k / FITTED for k in range(FITTED)]
     while any(striding(s, manner, g, phase)[1] > 0 for phase in looked_at):
         g = replace(g, hang=g.hang + 0.006)
@@ -102,15 +102,15 @@ def _reaching(s: Skeleton, manner: Manner, g: Gait, phases: Sequence[float]) -> 
 
 
 def still(s: Skeleton, manner: Manner, walks: bool) -> Pose:
-    """Return the pose of a person without an action: standing, or amid a walk."""
+    """Return the pose of a person without an action: standing, or in the middle of a walk."""
     if not walks:
         return standing(s, manner, manner.phase)
     return _reaching(s, manner, gait("walk", float(s["L_Hip"][2] - s["L_Ankle"][2])), (manner.phase,))[0]
 
 
 def striding(s: Skeleton, manner: Manner, g: Gait, phase: float) -> tuple[Pose, float]:
-    """A pose of a walk or a run at a phase from 0, where the left heel comes down, to 1, and by how many metres legs are too
-    short for it.
+    """A pose of a walk or a run at a phase from 0 (the left heel lands) to 1. Also the length that the legs lack for it,
+    metres.
     """
     turn = 2 * np.pi * phase
     leg = float(s["L_Hip"][2] - s["L_Ankle"][2])
@@ -137,7 +137,7 @@ def striding(s: Skeleton, manner: Manner, g: Gait, phase: float) -> tuple[Pose, 
 
 
 def standing(s: Skeleton, manner: Manner, phase: float) -> Pose:
-    """Someone who stands, shifts the weight a little and breathes."""
+    """The poses of a person who stands, shifts the weight a little and breathes."""
     turn = 2 * np.pi * phase
     body = _Body(s)
     breath, shift = 0.8 * np.sin(2 * turn), np.sin(turn)
@@ -159,7 +159,7 @@ def standing(s: Skeleton, manner: Manner, phase: float) -> Pose:
 
 
 def sitting(s: Skeleton, manner: Manner, phase: float) -> Pose:
-    """Someone who sits on a chair of `SEAT`: thighs level, shanks upright, hands on the thighs."""
+    """The poses of a person who sits on a chair of height `SEAT`: thighs level, shanks upright, hands on the thighs."""
     turn = 2 * np.pi * phase
     body = _Body(s)
     breath = 0.8 * np.sin(2 * turn)
@@ -187,7 +187,7 @@ def sitting(s: Skeleton, manner: Manner, phase: float) -> Pose:
 
 @dataclass(frozen=True)
 class _Foot:
-    """The foot at a phase of its own stride, which begins as the foot comes down."""
+    """The foot at a phase of its own stride, which begins at landing."""
 
     s: Skeleton
     prefix: str
@@ -197,7 +197,7 @@ class _Foot:
 
     @property
     def pitch(self) -> float:
-        """Degrees that the toes are higher than the heel."""
+        """Pitch of the foot, degrees, positive with the toes higher than the heel."""
         g, p, c = self.g, self.phase, self.g.contact
         flat, rise = 0.20 * c, 0.52 * c
         if p < c:
@@ -210,7 +210,7 @@ class _Foot:
 
     @property
     def toes(self) -> float:
-        """Degrees that the toes are bent up against the foot: they lie on the ground as long as the ball does."""
+        """Upward bend of the toes against the foot, degrees: they stay on the ground as long as the ball does."""
         p, c = self.phase, self.g.contact
         if p < c:
             return max(-self.pitch, 0.0)
@@ -225,7 +225,7 @@ class _Foot:
         if p < c:
             return self._down(p, self.pitch)
         start, end, t = self._down(c, -self.g.push), self._down(0.0, self.g.heel), (p - c) / (1 - c)
-        # A cubic in y that leaves and meets the ground at its own speed, and a lift that is lowest at both ends.
+        # A cubic in y that leaves and meets the ground at the ground's speed, and a lift that is lowest at both ends.
         slope = self.g.speed * self.g.seconds * (1 - c)
         h00, h10, h01, h11 = 2 * t**3 - 3 * t**2 + 1, t**3 - 2 * t**2 + t, 3 * t**2 - 2 * t**3, t**3 - t**2
         y = h00 * start[1] + h10 * slope + h01 * end[1] + h11 * slope
@@ -252,7 +252,7 @@ class _Foot:
 
 
 class _Body:
-    """A pose that is being made."""
+    """A pose under construction."""
 
     def __init__(self, s: Skeleton) -> None:
         self._s, self.root, self.short = s, s["Pelvis"], 0.0
@@ -263,11 +263,11 @@ class _Body:
         self._turns[JOINTS.index(name)] = product(_about(2, z), product(_about(1, y), _about(0, -x)))
 
     def arm(self, prefix: str, sign: int, ahead: float, away: float, bend: float, inward: float) -> None:
-        """Let an arm hang so many degrees ahead and away from the body, its elbow bent, its forearm turned inwards."""
+        """Hang an arm this many degrees ahead and away from the body, with its elbow bent and its forearm turned inwards."""
         s = self._s
         down = _unit(np.array([sign * np.sin(np.radians(away)), 0.0, -np.cos(np.radians(away))]))
         hang = _between(_unit(s[f"{prefix}Elbow"] - s[f"{prefix}Shoulder"]), down)
-        low = _about(1, sign * 8.0)  # shoulders of hanging arms are lower than those of the bind pose
+        low = _about(1, sign * 8.0)  # shoulders are lower with hanging arms than in the bind pose
         self._turns[JOINTS.index(f"{prefix}Collar")] = low
         self._turns[JOINTS.index(f"{prefix}Shoulder")] = product(low.T, product(_about(0, -ahead), hang))
         lower = product(hang, _unit(s[f"{prefix}Wrist"] - s[f"{prefix}Elbow"])[:, None])[:, 0]
@@ -276,7 +276,7 @@ class _Body:
         self._turns[JOINTS.index(f"{prefix}Elbow")] = product(hang.T, product(fold, hang))
 
     def reach(self, prefix: str, ankle: Float, pitch: float, toes: float, out: float = 0.0) -> None:
-        """Bend hip and knee so that the ankle is at a place, and hold the foot: degrees of pitch, and turned outwards."""
+        """Bend hip and knee so that the ankle reaches a point, and orient the foot: pitch and outward turn, degrees."""
         s = self._s
         pelvis = self._turns[0]
         hip = self.root + product(pelvis, (s[f"{prefix}Hip"] - s["Pelvis"])[:, None])[:, 0]
@@ -316,7 +316,7 @@ def _about(axis: int, degrees: float) -> Float:
 
 
 def _cross(a: Float, b: Float) -> Float:
-    (p, q, r), (x, y, z) = a.tolist(), b.tolist()  # for so few numbers Python is ten times as fast as numpy
+    (p, q, r), (x, y, z) = a.tolist(), b.tolist()  # for this few numbers plain Python is ten times as fast as numpy
     return np.array([q * z - r * y, r * x - p * z, p * y - q * x])
 
 

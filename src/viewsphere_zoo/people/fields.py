@@ -1,4 +1,4 @@
-"""Solids as fields: functions that are about the distance to a surface, metres, below 0 inside; and their meshes."""
+"""Solids as fields: functions that approximate the distance to a surface, metres, negative inside; and their meshes."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from viewsphere_zoo.shapes.solids import Float, Solid, curve
 
 Field = Callable[[Float], Float]
-"""Takes points (N, 3) to values (N,)."""
+"""Maps points (N, 3) to values (N,)."""
 
 
 def ball(center: ArrayLike, radii: ArrayLike, turn: Float | None = None) -> Field:
@@ -29,8 +29,8 @@ def ball(center: ArrayLike, radii: ArrayLike, turn: Float | None = None) -> Fiel
 
 
 def limb(start: ArrayLike, end: ArrayLike, radii: ArrayLike, bulge: ArrayLike = ((0, 0), (1, 0)), flat: float = 1.0) -> Field:
-    """A limb around a bone: knots (share of the way, radius), and (share, metres) by which it lies behind the bone (+Y). It is
-    `flat` times as thick from front to back as it is wide.
+    """A limb around a bone: knots (share of the length, radius), and knots (share, metres) of its offset behind the bone (+Y).
+    It is `flat` times as thick from front to back as it is wide.
     """
     a, b = np.asarray(start, np.float64), np.asarray(end, np.float64)
     way = b - a
@@ -80,7 +80,7 @@ def joined(k: float, *fields: Field) -> Field:
 
 
 def without(field: Field, taken: Field, k: float) -> Field:
-    """The first but for the second, with an edge rounded by about k metres."""
+    """The first field minus the second, with an edge rounded by about k metres."""
     return lambda p: -_blend(-field(p), taken(p), k)
 
 
@@ -90,7 +90,7 @@ def within(field: Field, other: Field, k: float) -> Field:
 
 
 def grown(field: Field, by: float | Field) -> Field:
-    """The solid with a surface so many metres further out."""
+    """The solid with its surface moved outwards by this distance, metres."""
     return lambda p: field(p) - (by(p) if callable(by) else by)
 
 
@@ -122,7 +122,7 @@ def gradient(field: Field, points: Float, step: float) -> Float:
 
 
 def steps(low: float, high: float, cell: float, fine: tuple[float, float, float] | None = None) -> Float:
-    """Places from low to about high in steps of `cell`; between the first two numbers of `fine` in steps of its third."""
+    """Coordinates from low to about high in steps of `cell`; between the first two numbers of `fine`, in steps of the third."""
     edges = [(low, high, cell)] if fine is None else [(low, fine[0], cell), fine, (fine[1], high, cell)]
     found = [a + (b - a) / (n := max(round((b - a) / c), 1)) * np.arange(n) for a, b, c in edges if b > a]
     return np.append(np.concatenate(found), high)
@@ -136,8 +136,8 @@ def cells(low: ArrayLike, high: ArrayLike, cell: float) -> tuple[Float, Float, F
 
 
 def surface(field: Field, axes: tuple[Float, Float, Float]) -> Solid:
-    """The closed surface of a field in quads of about the cells of a grid that holds all of it: surface nets (Gibson 1998),
-    whose vertices are then put upon the surface.
+    """The closed surface of a field in quads about the size of the cells of an enclosing grid: surface nets (Gibson 1998),
+    with vertices then projected onto the surface.
     """
     cell = float(max(np.diff(axis).max() for axis in axes))
     near = float(min(np.diff(axis).min() for axis in axes))
@@ -160,11 +160,11 @@ def surface(field: Field, axes: tuple[Float, Float, Float]) -> Solid:
 
 
 COARSE = 3
-"""Of so many grid points along an axis one is looked at first."""
+"""Stride of the first, coarse pass over the grid points along an axis."""
 
 
 def _sampled(field: Field, axes: tuple[Float, Float, Float], cell: float) -> NDArray[np.float64]:
-    """The field at all points of a grid: first at few of them, then where the surface may be near."""
+    """The field at all points of a grid: first at a few of them, then where the surface may be near."""
     shape = tuple(map(len, axes))
     chosen = [np.unique(np.append(np.arange(0, n, COARSE), n - 1)) for n in shape]
     rough_axes = [axis[c] for axis, c in zip(axes, chosen, strict=True)]
@@ -178,7 +178,7 @@ def _sampled(field: Field, axes: tuple[Float, Float, Float], cell: float) -> NDA
 
 
 def _crossings(corners: list[Float]) -> Float:
-    """In each cell the mean (N, 3) of where its edges cross the surface, in cells."""
+    """The mean (N, 3) of each cell's edge crossings with the surface, in cells."""
     places = list(product((0, 1), repeat=3))
     total, count = np.zeros((len(corners[0]), 3)), np.zeros(len(corners[0]))
     for i, a in enumerate(places):
@@ -211,7 +211,7 @@ def _quads(inside: NDArray[np.bool_], index: NDArray[np.int64]) -> NDArray[np.in
 
 
 def _split(points: Float, quads: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Two triangles a quad, cut along the shorter diagonal."""
+    """Two triangles for each quad, cut along the shorter diagonal."""
     a, b, c, d = quads.T
     short = _length(points[a] - points[c]) <= _length(points[b] - points[d])
     one = np.where(short[:, None], np.stack([a, b, c], 1), np.stack([b, c, d], 1))

@@ -1,4 +1,4 @@
-"""The naked body as fields, by regions that garments are cut for: trunk, arms, legs, hands. Places come from the skeleton."""
+"""The naked body as fields, by the regions that garments cover: trunk, arms, legs, hands. Positions come from the skeleton."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def sections(b: Build) -> Float:
 
 
 def torso(b: Build, s: Skeleton) -> Field:
-    """The trunk with its shoulders, and breasts as far as it has any."""
+    """The trunk with its shoulders, and with breasts depending on the build."""
     h = b.height
     body = joined(0.045 * h, trunk(sections(b)), mirror(_shoulder(b, s)))
     size = (1 - b.male) * (0.034 + 0.006 * b.weight) * h
@@ -49,7 +49,7 @@ def torso(b: Build, s: Skeleton) -> Field:
 
 
 def _shoulder(b: Build, s: Skeleton) -> Field:
-    """From the neck to the joint, along the collar bone, and the muscle over it."""
+    """The shoulder from the neck to the joint, along the collar bone, and the muscle over it."""
     h, thick = b.height, 0.021 + 0.004 * b.male
     bone = limb(
         (0.010 * h, 0.014 * h, 0.818 * h), s["L_Shoulder"] - (0.014 * h, 0, 0.006 * h), ((0, 0.024 * h), (1, thick * h))
@@ -59,7 +59,7 @@ def _shoulder(b: Build, s: Skeleton) -> Field:
 
 
 def arm(b: Build, s: Skeleton, loose: float = 0.0) -> Field:
-    """The left arm, from its shoulder to its wrist, so many metres thicker."""
+    """The left arm, from its shoulder to its wrist, thickened by this many metres."""
     h = b.height
     k = h * (0.92 + 0.10 * b.male) * (1 + 0.13 * b.weight)
     upper = ((0, 0.0245 * k), (0.2, 0.0285 * k), (0.5, 0.0270 * k), (1, 0.0228 * k))
@@ -72,7 +72,7 @@ def arm(b: Build, s: Skeleton, loose: float = 0.0) -> Field:
 
 
 def leg(b: Build, s: Skeleton, loose: float = 0.0, hem: float = 0.0) -> Field:
-    """The left leg, from its hip to its ankle, so many metres thicker, and `hem` at the ankle at least as thick."""
+    """The left leg, from its hip to its ankle, thickened by this many metres, and at the ankle by at least `hem`."""
     h = b.height
     k = h * (1 + 0.11 * b.weight)
     thigh = ((0, (0.0585 - 0.002 * b.male) * k), (0.3, (0.0545 - 0.003 * b.male) * k), (0.65, 0.0435 * k), (1, 0.0338 * k))
@@ -99,7 +99,7 @@ def hand(b: Build, s: Skeleton) -> Field:
     k = b.height * (0.95 + 0.07 * b.male)
     along = s["L_Hand"] - s["L_Wrist"]
     along = along / np.sqrt((along * along).sum())
-    inward = np.array([along[2], 0.0, -along[0]])  # to the thigh, when the arm hangs
+    inward = np.array([along[2], 0.0, -along[0]])  # towards the thigh when the arm hangs
     front = np.array([0.0, -1.0, 0.0])
 
     def at(a: float, f: float, n: float) -> Float:

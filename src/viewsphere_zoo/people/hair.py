@@ -26,11 +26,11 @@ THICK = {
 
 
 CELL = 0.0092
-"""Metres of a quad of hair."""
+"""Size of a quad of hair, metres."""
 
 
 def hair(head: Head, style: Style, phase: float) -> Solid | None:
-    """A head's hair; None for the bald."""
+    """A head's hair; None for a bald head."""
     if style == "bald":
         return None
     s, line = head.size, hairline(head, style)
@@ -43,7 +43,7 @@ def hair(head: Head, style: Style, phase: float) -> Solid | None:
 
 
 def rise(head: Head, style: Style, phase: float) -> Field:
-    """Return the height of hair upon the skull, metres."""
+    """Return the height of the hair above the skull, metres."""
     s, line = head.size, hairline(head, style)
 
     def height(p: Float) -> Float:
@@ -54,7 +54,7 @@ def rise(head: Head, style: Style, phase: float) -> Field:
 
 
 def falls(head: Head, style: Style, phase: float) -> Field | None:
-    """Return the part of the hair that hangs down or is bound; None for hair that does neither."""
+    """Return the hanging or tied part of the hair; None without one."""
     s = head.size
 
     def with_locks(field: Field) -> Field:
@@ -75,13 +75,13 @@ def falls(head: Head, style: Style, phase: float) -> Field | None:
 
 
 def hairline(head: Head, style: Style) -> Field:
-    """Above 0 where hair does not grow: the face, the ears and the neck."""
+    """The hairline as a field, positive where hair does not grow: face, ears and neck."""
     s = head.size
 
     def value(p: Float) -> Float:
         x, y, z = ((p - head.center) / s).T
         x = np.abs(x)
-        # From the forehead over the temple down before the ear, then behind it to the nape.
+        # From the forehead over the temple, down in front of the ear, then behind it to the nape.
         forehead = 0.066 - 0.10 * np.clip(x - 0.030, 0, 1) + (0.010 if style == "crop" else 0.0)
         if style == "side":
             forehead = forehead - 0.012
@@ -106,7 +106,7 @@ def hairline(head: Head, style: Style) -> Field:
 
 
 def _lift(head: Head, p: Float, style: Style) -> Float:
-    """Share of its thickness that hair has: less towards the neck, the temples and the forehead."""
+    """The hair's thickness as a share of the full one: less towards the neck, the temples and the forehead."""
     x, y, z = ((p - head.center) / head.size).T
     if style in ("bob", "long"):
         return np.clip(0.75 + 3 * z, 0.6, 1.15)

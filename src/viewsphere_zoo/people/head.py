@@ -14,7 +14,7 @@ from viewsphere_zoo.shapes.solids import Float, Solid, join, lathe, moved, turne
 
 @dataclass(frozen=True)
 class Face:
-    """The differences between faces, each about -1 to 1."""
+    """The features that vary between faces, each from about -1 to 1."""
 
     jaw: float = 0.0
     nose: float = 0.0
@@ -25,7 +25,7 @@ class Face:
 
 @dataclass(frozen=True, eq=False)
 class Head:
-    """A head: `center` between its ears at the height of its eyes, `size` metres a metre of the head that is described here."""
+    """A head: `center` between its ears at the height of its eyes, `size` the scale of the head that this module describes."""
 
     center: Float
     size: float
@@ -33,7 +33,7 @@ class Head:
     male: float
 
     def at(self, x: float, y: float, z: float) -> Float:
-        """The place of a point of the head."""
+        """The position of a point given in the head's own axes, before scaling."""
         return self.center + self.size * np.array([x, y, z])
 
     @property
@@ -100,12 +100,14 @@ class Head:
         return ball(self.at(*center), self.size * np.array(radii))
 
     def eyes(self, at: Float | None = None, radius: float | None = None) -> tuple[Solid, Solid, Solid]:
-        """White, iris and pupil of both eyes, which look ahead: the left one `at` a place, so large; by default its own."""
+        """White, iris and pupil of both eyes, which look ahead: the left one at `at` with this size; by default at the head's
+        own.
+        """
         r, middle = radius or 0.0125 * self.size, self.eye if at is None else at
         out = list[Solid]()
         for k, reach in enumerate(np.radians((180.0, 28.0, 11.0))):
             angle = np.linspace(reach, 0, 13 if k == 0 else 4)
-            lift = 1 + 0.003 * k  # each lies on the one before
+            lift = 1 + 0.003 * k  # each is on top of the previous one
             profile = lift * r * np.stack([np.sin(angle), np.cos(angle)], axis=1)
             profile = np.concatenate([[(0.0, profile[0, 1])], profile])  # a flat back closes it
             profile[-1, 0] = 0.0

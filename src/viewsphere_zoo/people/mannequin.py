@@ -24,7 +24,7 @@ from viewsphere_zoo.shapes.solids import Float, Solid, both_sides
 
 @dataclass(frozen=True)
 class Looks:
-    """The look of a person apart from build and clothes; colours sRGB. `fold` are phases of hair and folds."""
+    """The look of a person apart from build and clothes; colours sRGB. `fold` holds the phases of hair and folds."""
 
     face: Face = field(default_factory=Face)
     skin: Color = (0.80, 0.60, 0.48)
@@ -87,7 +87,7 @@ def dressed(pieces: Sequence[Piece], head: Head, looks: Looks) -> tuple[Mesh, ND
 
 
 def _head(b: Build, s: Skeleton, head: Head) -> Solid:
-    """Head, neck and what of the chest shows in a collar."""
+    """Head, neck and the part of the chest visible in a collar."""
     h = b.height
     bust = within(flesh.torso(b, s), ball(s["Neck"] + (0, 0, -0.03 * h), np.array((0.085, 0.085, 0.060)) * h), 0.003)
     whole = joined(0.020 * h, head.field(), joined(0.02 * h, neck(b, s, head), bust))
@@ -99,7 +99,7 @@ def _head(b: Build, s: Skeleton, head: Head) -> Solid:
 
 
 def _arms(b: Build, s: Skeleton, outfit: Outfit) -> Solid:
-    """Both hands, and as much of the arms as shows under the sleeves."""
+    """Both hands, and the parts of the arms visible below the sleeves."""
     start = max(outfit.sleeve - 0.35, 0.12)
     shoulder, elbow, wrist = (s[name] for name in ("L_Shoulder", "L_Elbow", "L_Wrist"))
     at = shoulder + start * (elbow - shoulder) if start < 1 else elbow + (start - 1) * (wrist - elbow)
@@ -125,7 +125,7 @@ def _combined(rows: Float, q: Float) -> Float:
 
 
 def _legs(b: Build, s: Skeleton, outfit: Outfit) -> Solid:
-    """Both legs, as much of them as shows under shorts or a skirt."""
+    """The parts of both legs visible below shorts or a skirt."""
     hip, knee, ankle = (s[name] for name in ("L_Hip", "L_Knee", "L_Ankle"))
     top = float(hip[2] + max(outfit.leg - 0.35, 0.25) * (knee[2] - hip[2]))
     whole = within(flesh.leg(b, s), plane((0, 0, top), (0, 0, 1)), 0.002)
@@ -135,7 +135,7 @@ def _legs(b: Build, s: Skeleton, outfit: Outfit) -> Solid:
 
 
 def _tints(mesh: Mesh, head: Head, looks: Looks) -> np.ndarray:
-    """Vertex colours (V, 4): lips, cheeks, brows and what is shaved on the skin; 1 elsewhere."""
+    """Vertex colours (V, 4): lips, cheeks, brows and shaved areas on the skin; 1 elsewhere."""
     colors = np.ones((len(mesh.vertices), 4))
     skin = next(i for i, material in enumerate(mesh.materials) if material.name == "skin")
     own = np.unique(mesh.triangles[mesh.triangle_material == skin])
@@ -146,7 +146,7 @@ def _tints(mesh: Mesh, head: Head, looks: Looks) -> np.ndarray:
 
 
 def _painted(q: Float, skin: Float, locks: Float, head: Head) -> Float:
-    """Linear colours (N, 3) of skin at places of the head."""
+    """Linear colours (N, 3) of skin at points of the head."""
     x, y, z = np.abs(q[:, 0]), q[:, 1], q[:, 2]
     color = np.broadcast_to(skin, (len(q), 3)).copy()
 

@@ -1,6 +1,7 @@
-"""Garments' ends: a closed surface cut along a line, its edge turned inwards: it is closed again, and looks open.
+"""Openings of garments: a closed surface is cut along a line and its edge turned inwards, so that it stays closed but looks
+open.
 
-Vertices may have more columns than their places: what is known of them, and goes over from one to the next.
+Vertices may have further columns after their positions: attributes that are interpolated along with them.
 """
 
 from __future__ import annotations
@@ -13,8 +14,8 @@ from viewsphere_zoo.shapes.solids import Float, Solid, join
 
 
 def opened(solid: Solid, level: Float, depth: float, thick: float) -> Solid:
-    """The part of a closed surface where level (V,) is at most 0, closed by hems of `thick` metres that lead `depth` metres
-    into it, and end in a cap.
+    """The part of a closed surface where level (V,) is at most 0. Hems of `thick` metres close it; they lead `depth` metres
+    into it and end in a cap.
     """
     kept, away = cut(solid, level)
     if not len(kept.triangles) or not len(away.triangles):
@@ -24,7 +25,7 @@ def opened(solid: Solid, level: Float, depth: float, thick: float) -> Solid:
 
 
 def welded(solid: Solid) -> Solid:
-    """The solid with vertices of one place made one."""
+    """The solid with vertices at the same position merged."""
     _, first, index = np.unique(np.round(solid.vertices[:, :3], 7), axis=0, return_index=True, return_inverse=True)
     triangles = index.reshape(-1)[solid.triangles]
     a, b, c = triangles.T
@@ -51,7 +52,7 @@ def rings(solid: Solid) -> list[NDArray[np.int64]]:
 
 
 def _hem(solid: Solid, ring: NDArray[np.int64], depth: float, thick: float) -> Solid:
-    """From an open edge inwards by `thick`, back into the garment by `depth`, and a cap."""
+    """A hem from an open edge inwards by `thick` and back into the garment by `depth`, with a cap."""
     more = solid.vertices[ring, 3:]
     edge = solid.vertices[ring, :3]
     middle = edge.mean(axis=0)

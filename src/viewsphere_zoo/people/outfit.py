@@ -1,4 +1,4 @@
-"""The clothes of a person, drawn or given, as choices and as solids."""
+"""The clothes of a person, random or given, as choices and as solids."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ Top = Literal["t_shirt", "shirt", "jumper", "jacket"]
 Bottom = Literal["trousers", "shorts", "skirt"]
 
 CELL = 0.019
-"""Metres of a quad of cloth."""
+"""Size of a quad of cloth, metres."""
 
 
 @dataclass(frozen=True)
@@ -54,7 +54,7 @@ class Outfit:
 
 @dataclass(frozen=True, eq=False)
 class Tailor:
-    """Cuts clothes for one body. `fold` (3,) are phases of the folds."""
+    """The maker of clothes for one body. `fold` (3,) holds the phases of the folds."""
 
     build: Build
     skeleton: Skeleton
@@ -122,7 +122,7 @@ class Tailor:
         return opened(solid, self.neckline()(solid.vertices), 0.0, 0.003)
 
     def neckline(self) -> Field:
-        """Above 0 where the neck comes out of the top."""
+        """A field that is positive where the neck emerges from the top."""
         s, h, o = self.skeleton, self.build.height, self.outfit
         deep = {"t_shirt": 0.016, "shirt": 0.010, "jumper": 0.010, "jacket": -0.014}[o.top]
         wide = {"jacket": 0.058}.get(o.top, 0.043)

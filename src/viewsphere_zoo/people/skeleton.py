@@ -1,4 +1,6 @@
-"""A person's 24 joints: order and names of SMPL (Loper et al. 2015) and SURREAL, places of our own."""
+"""A person's 24 joints: in the order and with the names of SMPL (Loper et al. 2015) and SURREAL, at viewsphere's own
+positions.
+"""
 
 from __future__ import annotations
 
@@ -17,7 +19,9 @@ JOINTS = (
 PARENTS = (-1, 0, 0, 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 9, 9, 12, 13, 14, 16, 17, 18, 19, 20, 21)
 
 SPLAY = 45.0
-"""Degrees between the arms of the bind pose and the vertical: flesh of arm and chest lie apart, as that of the legs does."""
+"""Degrees between the arms of the bind pose and the vertical: keeps the flesh of arm and chest apart, like that of the two
+legs.
+"""
 
 
 @dataclass(frozen=True, eq=False)

@@ -13,7 +13,7 @@ from viewsphere_zoo.people.skeleton import JOINTS, Skeleton
 from viewsphere_zoo.shapes.solids import Float
 
 MOST = 4
-"""Joints of a vertex, as many as a glTF primitive holds in one attribute."""
+"""Number of joints of a vertex, as many as fit into one attribute of a glTF primitive."""
 
 HEAD, SHOES = ("head", "hair", "eyes"), ("shoes",)
 
@@ -29,7 +29,7 @@ def weights(b: Build, s: Skeleton, points: Float, parts: NDArray[np.str_], is_sk
     arm[firm | np.isin(parts, ("shoes", "legs", "bottom"))] = 0
     leg[firm | np.isin(parts, ("arms", "top")) & (left[:, 2] > s["Spine1"][2])] = 0
     leg[np.isin(parts, ("shoes", "legs"))] = 1
-    # A hem follows the thighs, but not all the way, and what is under it no further.
+    # A hem follows the thighs only in part, and the legs under it no further.
     under = np.where(parts == "top", 1.0, (parts == "bottom") * _ramp(points[:, 2] - 0.500 * b.height, 0.03 * b.height))
     leg *= 1 - 0.4 * under
     arm[parts == "arms"] = 1
@@ -51,7 +51,7 @@ def weights(b: Build, s: Skeleton, points: Float, parts: NDArray[np.str_], is_sk
 
 
 def strongest_four(w: Float) -> tuple[NDArray[np.int64], Float]:
-    """Of weights (N, 24) the four largest: joints and weights (N, 4), which sum to 1."""
+    """The four largest of weights (N, 24): joints and weights (N, 4), which sum to 1."""
     order = np.argsort(-w, axis=1, kind="stable")[:, :MOST]
     best = np.maximum(np.take_along_axis(w, order, axis=1), 0)
     best[best < 1e-3] = 0
@@ -59,13 +59,13 @@ def strongest_four(w: Float) -> tuple[NDArray[np.int64], Float]:
 
 
 def _ramp(x: Float, width: float | Float) -> Float:
-    """From 0 at -width to 1 at width, smoothly."""
+    """A smooth ramp from 0 at -width to 1 at width."""
     t = np.clip(x / width * 0.5 + 0.5, 0, 1)
     return t * t * (3 - 2 * t)
 
 
 def _arm_share(b: Build, s: Skeleton, p: Float) -> Float:
-    """1 on the arm, 0 on the trunk: which flesh is nearer, and how far out."""
+    """1 on the arm, 0 on the trunk: from the nearer flesh, and the distance outwards."""
     nearer = flesh.torso(b, s)(p) - flesh.arm(b, s)(p)
     out = ((p - s["L_Shoulder"]) * (s["L_Elbow"] - s["L_Shoulder"])).sum(axis=1) / (0.166 * b.height)
     return _ramp(nearer - 0.004 * b.height, 0.028 * b.height) * _ramp(out - 0.012 * b.height, 0.045 * b.height)
@@ -99,7 +99,7 @@ def _trunk(b: Build, s: Skeleton, p: Float, firm: NDArray[np.bool_]) -> dict[str
 
 
 def _chain(s: Skeleton, p: Float, names: tuple[str, ...], bands: tuple[float, ...], height: float) -> dict[str, Float]:
-    """Shares of the joints of a limb, which go over where the limb bends."""
+    """Shares of the joints of a limb, blended where the limb bends."""
     places = [s[f"L_{name}"] for name in names]
     beyond = list[Float]()
     for k, band in enumerate(bands, 1):

@@ -26,13 +26,13 @@ PARKED = 0.0
 """Usual share of the driveways with a car."""
 
 BAY = (2.3, 5.8)
-"""Width and length of a space to park in on a driveway, metres."""
+"""Width and length of a parking space on a driveway, metres."""
 
 APART = 1.7
-"""Metres between a house's front, over which its eaves reach, and that space."""
+"""Distance between a house's front, including its eaves, and that space, metres."""
 
 WIDE = {"bench": 1.1, "driveway": 0.0}
-"""Metres that a piece takes around its middle where that is more than `SLIM`; trees take their crowns."""
+"""Radius of a family's pieces, metres, where it differs from `SLIM`; trees use their crowns."""
 
 SLIM = 0.5
 
@@ -42,12 +42,12 @@ FAR = 65.0
 
 @dataclass(frozen=True)
 class Neighbourhood:
-    """Parameters of a neighbourhood; metres. `seed` draws all that the other parameters leave open.
+    """Parameters of a neighbourhood; metres. `seed` draws everything that the other parameters leave open.
 
     houses: designs with the garage on the right, without one, with it on the left; trees: designs; lamp_spacing: between lamp
-    posts of one side; lamp: y of the right one nearest to the origin, mirrored on the left; greenery: share of plots with a
-    tree before the house; bounded: share with a hedge or fence before it; clear: distance from the origin that trees keep;
-    traffic: cars on driveways and people on the pavements.
+    posts of one side; lamp: y of the lamp post on the right that is nearest to the origin, mirrored on the left; greenery:
+    share of plots with a tree in front of the house; bounded: share with a hedge or fence in front; clear: distance from the
+    origin that trees keep; traffic: cars on driveways and people on the pavements.
     """
 
     seed: int = 0
@@ -79,7 +79,7 @@ class _Stand:
 
 
 def neighbourhood(parameters: Neighbourhood | None = None) -> Place:
-    """The street along Y with all that stands beside it; the origin is on the middle of the road, free for 9 m each way."""
+    """The street along Y with everything beside it; the origin is on the middle of the road, free for 9 m each way."""
     p = parameters or Neighbourhood()
     design, lots, lamps, bounds, green, props, life = np.random.default_rng(p.seed).spawn(7)
     road, land = _designs(design, "street", 1)[0], _designs(design, "landscape", 1)[0]
@@ -124,7 +124,7 @@ def _named(stands: Iterable[tuple[str, int, Matrix4]]) -> tuple[PlacePiece, ...]
 
 
 def _bays(plots: Sequence[Plot], stands: Sequence[_Stand]) -> tuple[Bay, ...]:
-    """A space to park in on each driveway that no tree grows over, before the garage, headed to it."""
+    """A parking space on each driveway without a tree over it, in front of the garage and facing it."""
     trees = [(s.x, s.y, _around(s)) for s in stands if s.family == "tree"]
     width, length = BAY
     found: list[Bay] = []
@@ -136,7 +136,7 @@ def _bays(plots: Sequence[Plot], stands: Sequence[_Stand]) -> tuple[Bay, ...]:
 
 
 def _around(stand: _Stand) -> float:
-    """Metres that a thing takes around its middle."""
+    """Radius of a piece around its middle, metres."""
     if stand.family == "tree":
         return tree.draw(np.random.default_rng(stand.seed)).crown / 2
     return WIDE.get(stand.family, SLIM)
@@ -199,7 +199,7 @@ def _paved(plots: Sequence[Plot], design: np.random.Generator) -> list[_Stand]:
 
 
 def _beside(y: float, crossings: Iterable[float], gap: float = 2.5) -> float:
-    """The y nearest to `y` that is not before a driveway."""
+    """The y nearest to `y` that is not in front of a driveway."""
     tries = y + np.array([s * 0.25 * k for k in range(40) for s in (1, -1)])
     free = (np.abs(tries[:, None] - np.array([*crossings])) > gap).all(axis=1)
     return float(tries[free][0])
@@ -218,7 +218,7 @@ def _lamp_posts(p: Neighbourhood, plan: street.Street, rng: np.random.Generator)
 
 
 def _boundaries(p: Neighbourhood, plots: Sequence[Plot], rng: np.random.Generator) -> list[_Stand]:
-    """Hedges and fences between the front gardens, and along the pavement save before the houses at the origin."""
+    """Hedges and fences between the front gardens, and along the pavement, except in front of the houses at the origin."""
     low = _designs(rng, "hedge", 2, lambda h: h.height < 1.3)
     kinds = [("hedge", s) for s in low] + [("fence", s) for s in _designs(rng, "fence", 2, lambda f: f.style != "boards")]
     stands: list[_Stand] = []
@@ -264,7 +264,7 @@ def _grows(p: Neighbourhood, q: Plot, others: Sequence[_Stand], x: float, y: flo
 
 
 def _shrubs(plots: Sequence[Plot], rng: np.random.Generator) -> list[_Stand]:
-    """Beds before the houses' walls, beside the path to the door."""
+    """Beds in front of the houses' walls, beside the path to the door."""
     seeds = _designs(rng, "shrub", 2)
     stands: list[_Stand] = []
     for q in (q for q in plots if abs(q.y) < FAR):

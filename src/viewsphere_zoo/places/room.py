@@ -10,7 +10,7 @@ from viewsphere_zoo.indoors.places import around_free_floor
 
 
 def room(seed: int = 0) -> Place:
-    """The room of this seed; its floor is z = 0, the origin in the middle of what is free of the floor."""
+    """The room of this seed; its floor is z = 0, the origin in the middle of the free floor."""
     return around_free_floor(np.random.default_rng(seed), lambda interior: len(interior.rooms) == 1)
 
 

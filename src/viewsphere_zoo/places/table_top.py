@@ -12,14 +12,14 @@ from viewsphere_zoo.indoors.places import drawn, laid_out
 from viewsphere_zoo.indoors.plan import Room
 
 LEAST = (0.9, 0.55)
-"""Width and depth of the table, metres, at least."""
+"""Least width and depth of the table, metres."""
 
 AROUND = 0.8
-"""Metres between the table and the walls, at least, for cameras to stand."""
+"""Least distance between the table and the walls, metres, as room for cameras."""
 
 
 def table_top(seed: int = 0) -> Place:
-    """The room of this seed with a table that is empty; z = 0 is its top, the origin its middle."""
+    """The room of this seed with an empty table; z = 0 is its top, the origin its middle."""
     rng = np.random.default_rng(seed)
     while True:
         own, interior = drawn(rng, lambda one: len(one.rooms) == 1 and one.rooms[0].kind != "bedroom")
@@ -34,7 +34,7 @@ def table_top(seed: int = 0) -> Place:
 
 
 def _is_wanted(stand: Stand, room: Room) -> bool:
-    """Return whether it is a table that is large enough, and free on all sides."""
+    """Return whether the table is large enough and free on all sides."""
     x0, y0, x1, y1 = stand.rectangle
     apart = min(x0 - room.low[0], y0 - room.low[1], room.high[0] - x1, room.high[1] - y1)
     return stand.family == "table" and stand.size[0] >= LEAST[0] and stand.size[1] >= LEAST[1] and apart >= AROUND

@@ -34,17 +34,17 @@ KINDS: dict[str, Callable[[Any], bool]] = {
 
 
 PARKED = 0.4
-"""Usual share of the spaces to park in that are taken."""
+"""Usual share of parking spaces that are occupied."""
 
 WIDE = {"bench": 1.1, "tree": 2.2}
-"""Metres that furniture takes around its middle where that is more than `SLIM`; small trees with their crowns."""
+"""Radius of a family's pieces, metres, where it differs from `SLIM`; small trees use their crowns."""
 
 SLIM = 0.4
 
 
 @dataclass(frozen=True)
 class Frontage:
-    """A side of a block: its left end as one faces the block from the road, the direction to the right, and its length."""
+    """A side of a block: its left end as seen from the road, the direction to the right, and its length."""
 
     start: tuple[float, float]
     right: tuple[float, float]
@@ -56,7 +56,7 @@ class Frontage:
         return math.degrees(math.atan2(self.right[1], self.right[0]))
 
     def at(self, along: float, inset: float) -> tuple[float, float]:
-        """The point so far from the left end, and from the kerb into the block."""
+        """The point this far from the left end, and this far from the kerb into the block."""
         (x, y), (a, b) = self.start, self.right
         return x + a * along - b * inset, y + b * along + a * inset
 
@@ -75,7 +75,7 @@ def frontages(block: Block) -> tuple[Frontage, ...]:
 
 @dataclass(eq=False)
 class _Town:
-    """The pieces of a town as they come together."""
+    """The pieces of a town under construction."""
 
     rng: np.random.Generator
     pieces: list[PlacePiece] = field(default_factory=list[PlacePiece])
@@ -95,11 +95,11 @@ class _Town:
         return known[int(self.rng.integers(len(known)))]
 
     def put(self, family: str, seed: int, x: float, y: float, turn: float = 0.0, z: float = STEP) -> None:
-        """A piece where it stands."""
+        """Add a piece at a position."""
         self.put_at(family, seed, standing(x, y, turn % 360, z))
 
     def put_at(self, family: str, seed: int, world_from_piece: Matrix4) -> None:
-        """A piece in its frame."""
+        """Add a piece in its frame."""
         self.count[family] += 1
         name = f"{family}_{self.count[family]}"
         self.pieces.append(PlacePiece(name, family, seed, family.replace("_", " "), world_from_piece))
@@ -107,7 +107,7 @@ class _Town:
     def stand(
         self, family: str, side: Frontage, along: float, inset: float, turn: float = 0.0, kind: str = "", **of: Any
     ) -> None:
-        """A member of a family on a side of a block, its front to the road unless it is turned."""
+        """Add a member of a family on a side of a block, its front to the road unless turned."""
         seed, _ = self.drawn(family, kind, **of)
         self.put(family, seed, *side.at(along, inset), side.turn_deg + turn)
 
@@ -151,7 +151,7 @@ def _shops(t: _Town, block: Block) -> None:
 
 
 def _terrace(t: _Town, side: Frontage, start: float, stop: float) -> float:
-    """Houses with shops, wall to wall between two places of a side; gives how deep the deepest is."""
+    """Houses with shops, wall to wall between two positions along a side; returns the depth of the deepest house."""
     row, used = list[tuple[int, Any]](), 0.0
     while True:
         seed, p = t.drawn("shop")
@@ -167,7 +167,7 @@ def _terrace(t: _Town, side: Frontage, start: float, stop: float) -> float:
 
 
 def _houses(t: _Town, block: Block) -> None:
-    """Houses in gardens on the two long sides, hedges along the pavement with gaps before the doors."""
+    """Houses in gardens on the two long sides, hedges along the pavement with gaps in front of the doors."""
     for side in frontages(block)[1::2]:
         for along in _spread(side.length, 17.5, 10.5):
             seed, p = t.drawn("house", "plain")
@@ -215,7 +215,7 @@ def _pavement(t: _Town, side: Frontage) -> None:
 
 
 def _corners(t: _Town, ground: TownGround) -> None:
-    """Traffic lights before every crossing of the town's inner junctions."""
+    """Traffic lights at every crossing of the town's inner junctions."""
     for block, _ in ground.blocks:
         for side in frontages(block):
             x, y = side.at(side.length - CORNER - 0.4, 0.0)
@@ -248,7 +248,7 @@ def _spot(piece: PlacePiece) -> tuple[float, float]:
 
 
 def _spread(length: float, pitch: float, margin: float) -> Iterator[float]:
-    """Places about this far apart along a side, clear of its ends."""
+    """Positions about this far apart along a side, clear of its ends."""
     count = max(1, int((length - 2 * margin) // pitch) + 1)
     yield from (np.linspace(margin, length - margin, count) if count > 1 else np.array([length / 2])).tolist()
 

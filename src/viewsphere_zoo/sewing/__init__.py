@@ -1,1 +1,1 @@
-"""The parts of a backpack: cloth, what it is carried by, how it closes."""
+"""The parts of a backpack: cloth, straps and closures."""

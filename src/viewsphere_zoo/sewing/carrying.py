@@ -53,7 +53,7 @@ def straps(p: Backpack, c: dict[str, Material]) -> list[Piece]:
 
 
 def back(p: Backpack, c: dict[str, Material]) -> list[Piece]:
-    """Padding where the bag lies on a back."""
+    """Padding on the side of the bag against the wearer's back."""
     d = p.depth / 2 * (0.75 + 0.35 * p.fill)
     pads = [
         moved(rounded_box((0.26 * p.width, 0.03, 0.62 * p.height), 0.014, 2), (s * 0.19 * p.width, d - 0.008, 0.45 * p.height))
@@ -63,7 +63,7 @@ def back(p: Backpack, c: dict[str, Material]) -> list[Piece]:
 
 
 def handle(p: Backpack, c: dict[str, Material]) -> list[Piece]:
-    """A loop to carry it by."""
+    """A carrying loop."""
     z = p.height - 0.015
     y = 0.35 * p.depth / 2
     line = smooth(

@@ -105,7 +105,7 @@ def roll_top(p: Backpack, bag: Bag, c: dict[str, Material]) -> list[Piece]:
 
 
 def flap(p: Backpack, bag: Bag, c: dict[str, Material]) -> list[Piece]:
-    """A flap over the top that two straps with buckles hold down."""
+    """A flap over the top, held down by two straps with buckles."""
     w, d, h = p.width / 2, p.depth / 2 * (0.75 + 0.35 * p.fill), p.height
     line = smooth(
         [

@@ -1,4 +1,4 @@
-"""Pieces (a solid, its part's name, its material) become one Mesh with normals by crease angle."""
+"""The assembly of pieces (a solid, its part's name, its material) into one Mesh with normals by crease angle."""
 
 from __future__ import annotations
 

@@ -9,7 +9,7 @@ from viewsphere_zoo.shapes.solids import Float, Solid
 
 Index = NDArray[np.int64]
 SNAP = 1e-4
-"""Vertices nearer to the level than this count as lying on it, so that no slivers arise."""
+"""Vertices nearer to the level than this count as on it, to avoid slivers."""
 
 
 def cut(solid: Solid, level: Float) -> tuple[Solid, Solid]:

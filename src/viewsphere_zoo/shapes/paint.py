@@ -1,4 +1,4 @@
-"""Materials that families share; colours are given as sRGB, as people pick them, and kept linear."""
+"""Materials that families share; colours are given as sRGB, as in colour pickers, and stored as linear values."""
 
 from __future__ import annotations
 

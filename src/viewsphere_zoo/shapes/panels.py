@@ -1,6 +1,6 @@
 """Shapes that follow a curved surface: rounded panels, frames around openings, ribbons along a line.
 
-A surface is a function of two arrays (u, v) of one shape (...) to points (..., 3); outside is d/du x d/dv.
+A surface is a function from two arrays (u, v) of one shape (...) to points (..., 3); outside is d/du x d/dv.
 """
 
 from __future__ import annotations
@@ -91,7 +91,7 @@ def frame(
 ) -> tuple[Solid, Float]:
     """The surface between a cell's border and a rounded hole, and the hole's ring (N, 2) in (u, v).
 
-    Corners are (4, 2) in (u, v); cells with one border share its points when their counts agree.
+    Corners are (4, 2) in (u, v); cells that share a border share its points if their counts agree.
     """
     inner = in_quad(hole, rounded_square(rounding, count))
     outer = in_quad(cell, _snapped(rounded_square(rounding, count)))

@@ -121,7 +121,7 @@ def tube(path: ArrayLike, radius: ArrayLike, sides: int = 10) -> Solid:
 
 
 def rounded_box(size: ArrayLike, radius: float, steps: int = 3) -> Solid:
-    """A box about the origin with rounded edges, sharp ones for radius 0 and no steps; size (x, y, z) and radius in metres."""
+    """A box about the origin with rounded edges, sharp edges for radius 0 and no steps; size (x, y, z) and radius in metres."""
     half = np.asarray(size, np.float64) / 2
     r = min(radius, 0.999 * float(half.min()))
     quarter = np.linspace(0, np.pi / 2, steps + 1)

@@ -133,7 +133,7 @@ def dressed(sail: Sail, part: str, look: Cut, main: bool) -> list[Piece]:
 
 
 def _bands(pattern: Pattern) -> Sequence[tuple[float, bool]]:
-    """Heights (fractions) and whether the second colour begins there."""
+    """Borders between colours: heights (fractions), and whether the second colour begins there."""
     return {
         "plain": (),
         "head": ((0.66, True),),

@@ -14,7 +14,7 @@ MAHOGANY: Color = (0.42, 0.17, 0.08)
 
 @dataclass(frozen=True)
 class Coats:
-    """Materials: topsides, bottom, stripes, deck, wood, and those that all boats share."""
+    """Materials: topsides, bottom, stripes, deck, wood, and the materials that all boats share."""
 
     hull: Material
     bottom: Material
@@ -61,7 +61,7 @@ def coats(
     varnished: bool = False,
     inside: Color | None = None,
 ) -> Coats:
-    """Return the materials of a boat of these colours; varnished: the hull is bright wood."""
+    """Return the materials of a boat of these colours; varnished: the hull is of varnished wood."""
     planks: Color = (min(1, wood[0] * 0.82), wood[1] * 0.78, wood[2] * 0.75)
     return Coats(
         hull=varnish("hull", hull) if varnished else gelcoat("hull", hull),

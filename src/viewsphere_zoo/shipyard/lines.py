@@ -60,9 +60,10 @@ def _blend(t: Float, fore: float, middle: float, aft: float) -> Float:
 
 @dataclass(frozen=True)
 class Lines:
-    """Metres. sheer, keel: z over t; stem, stern: how far the profile stands back from the ends of the length, over the
-    height from keel 0 to sheer 1, in lengths; widest: t of the greatest beam; entry, quarter: exponents (p, q) of
-    (1 - s^p)^q from the greatest beam to the bow and to the stern, where the share `tuck` of the beam is left."""
+    """A hull's lines, metres. sheer, keel: z over t; stem, stern: how far the profile stands back from the ends of the length,
+    over the height from keel 0 to sheer 1, in lengths; widest: t of the greatest beam; entry, quarter: exponents (p, q) of (1
+    - s^p)^q from the greatest beam to the bow and to the stern, where the share `tuck` of the beam remains.
+    """
 
     length: float
     beam: float
@@ -109,12 +110,12 @@ class Lines:
         return self.point(t, 1.0)
 
     def level(self, t: float, z: float) -> float:
-        """v at height z of the section at t."""
+        """The parameter v at height z in the section at t."""
         v = np.linspace(0, 1, 101)
         return float(np.interp(z, self.point(t, v)[:, 2], v))
 
     def at_y(self, y: float, v: float = 1.0) -> float:
-        """t of a place along the ship, by default on the sheer."""
+        """The parameter t of a position along the ship, by default on the sheer."""
         t = np.linspace(0, 1, 401)
         return float(np.interp(y, self.point(t, v)[:, 1], t))
 
@@ -145,7 +146,7 @@ class Lines:
         return np.interp(np.asarray(y, np.float64), line[:, 1], line[:, 0])
 
     def within(self, points: Float, z: float, gap: float) -> Float:
-        """The points of the left side moved to the height z, and, where this leaves the hull, to `gap` inside the hull."""
+        """The points of the left side moved to the height z, and to `gap` inside the hull if they would leave it."""
         line = self.waterline(z)
         inside = line[line[:, 0] > gap, :2]
         y = np.clip(points[..., 1], inside[0, 1] + gap, inside[-1, 1] - gap)
@@ -154,6 +155,6 @@ class Lines:
 
 
 def stations(count: int, dense: float = 0.6) -> Float:
-    """Values from 0 to 1 that lie closer together at the ends; `dense` from 0 (even) to below 1."""
+    """Values from 0 to 1 that are closer together at the ends; `dense` from 0 (even) to below 1."""
     s = np.linspace(0, 1, count)
     return s - dense * np.sin(2 * np.pi * s) / (2 * np.pi)

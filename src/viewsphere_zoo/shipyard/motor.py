@@ -265,7 +265,7 @@ def _bow_cushions(p: MotorBoat, deck: Deck, c: Coats, well: Opening) -> list[Pie
 
 
 def _console(p: MotorBoat, deck: Deck, c: Coats) -> list[Piece]:
-    """A helm stand amidships with a leaning post, a cushion ahead of it, cushions in the bow, perhaps a top."""
+    """A helm stand amidships with a leaning post, a cushion ahead of it, cushions in the bow, optionally a top."""
     well = deck.openings[0]
     floor, y = well.floor, 0.5 * p.length
     body = [(floor - 0.01, 0.36, 0.36, y), (floor + 0.06, 0.36, 0.36, y), (floor + 0.75, 0.34, 0.3, y + 0.02)]

@@ -26,9 +26,9 @@ SKIN = 0.018
 class RowingBoat:
     """Parameters of a rowing boat; lengths in metres, angles in degrees, colours sRGB 0..1.
 
-    length, beam: of the shell; depth: from the keel to the sheer amidships; spring: how much higher than that bow and stern
-    rise, fractions of the depth; planks: strakes of a clinker hull, 0 for a smooth one; thwarts: benches to sit on;
-    oars: pairs; sweep: how far the oars trail aft of square, None when they lie in the boat.
+    length, beam: of the shell; depth: from the keel to the sheer amidships; spring: how much higher bow and stern rise,
+    fractions of the depth; planks: strakes of a clinker hull, 0 for a smooth one; thwarts: benches to sit on; oars: pairs;
+    sweep: how far the oars trail aft of square, None if they are laid in the boat.
     """
 
     length: float = 4.0

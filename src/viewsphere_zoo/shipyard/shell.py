@@ -22,7 +22,7 @@ UP = np.array([0.0, 0.0, 1.0])
 @dataclass(frozen=True)
 class Paint:
     """The borders between colours, metres.
-    bottom: z up to which the antifouling goes.
+    bottom: z of the antifouling's upper edge.
     boot: width of the stripe above it.
     stripe: depth of the sheer stripe's edges below the sheer, or None.
     """

@@ -1,6 +1,6 @@
 """A town's grid: roads between blocks with rounded corners, their pavements and painted lines; metres, the road at z = 0.
 
-Roads run along lines x = const and y = const. From a road's middle outwards: a lane, a strip to park in, the kerb, pavement.
+Roads run along lines x = const and y = const. From a road's middle outwards: a lane, a parking strip, the kerb, the pavement.
 """
 
 from __future__ import annotations
@@ -43,10 +43,10 @@ ZEBRA = (1.6, 4.4)
 """Start and end of a junction's zebra crossings, beyond the corners' curves."""
 
 SPACE = 5.8
-"""Length of a space to park in."""
+"""Length of a parking space."""
 
 WALK = (1.4, 0.5)
-"""Metres from the kerb to the middle of the way that people take, between lamp posts and benches, and its width."""
+"""Distance from the kerb to the middle of the walking lane, between lamp posts and benches, and the lane's width, metres."""
 
 
 @dataclass(frozen=True)
@@ -60,12 +60,12 @@ class Block:
 
     @property
     def middle(self) -> tuple[float, float]:
-        """Its middle."""
+        """The block's middle."""
         return (self.low[0] + self.high[0]) / 2, (self.low[1] + self.high[1]) / 2
 
     @property
     def size(self) -> tuple[float, float]:
-        """Along x and y."""
+        """Size along x and y."""
         return self.high[0] - self.low[0], self.high[1] - self.low[1]
 
 
@@ -93,7 +93,7 @@ def _at(points: Float, z: float) -> Float:
 
 
 def land(block: Block, green: bool) -> list[Piece]:
-    """A block's kerb, its pavement, and what lies behind it: grass, or paving."""
+    """A block's kerb, its pavement, and the area behind it: grass or paving."""
     edge = ((0.0, 0.0), (0.0, STEP - 0.02), (0.02, STEP), (KERB, STEP))
     kerb = np.array([_at(ring(block, inset), z) for inset, z in edge])
     paved = np.array([_at(ring(block, inset), STEP) for inset in (KERB, KERB + 1.3, PAVED)])
@@ -109,7 +109,7 @@ def land(block: Block, green: bool) -> list[Piece]:
 
 
 def roads(x: Sequence[float], y: Sequence[float]) -> list[Piece]:
-    """The asphalt under all roads, the green strip around them, and what closes the ground below."""
+    """The asphalt under all roads, the green strip around them, and the faces that close the ground below."""
     low, high = (x[0] - HALF, y[0] - HALF), (x[-1] + HALF, y[-1] + HALF)
     lines = [np.linspace(a, b, max(2, round((b - a) / 6)) + 1) for a, b in zip(low, high, strict=True)]
     gx, gy = np.meshgrid(*lines, indexing="ij")
@@ -135,7 +135,9 @@ def _square(block: Block, inset: float) -> Float:
 
 
 def _stretches(x: Sequence[float], y: Sequence[float]) -> Iterator[tuple[int, float, float, float]]:
-    """Parts of roads between the zebra crossings at their ends: the axis along which they run, where, from and to."""
+    """Parts of roads between the zebra crossings at their ends: their axis, their position across it, and their start and
+    end.
+    """
     reach = HALF + CORNER + ZEBRA[1]
     for axis, (across, along) in enumerate(((y, x), (x, y))):
         for at, (a, b) in product(across, pairwise(along)):
@@ -148,7 +150,7 @@ def _turned(axis: int, along: tuple[float, float], across: tuple[float, float], 
 
 
 def paint(x: Sequence[float], y: Sequence[float], dash: tuple[float, float] = (3.0, 4.0)) -> list[Piece]:
-    """Broken centre lines, stop lines and zebra crossings at the junctions, and the marks of the spaces to park in."""
+    """Broken centre lines, stop lines and zebra crossings at the junctions, and the marks of the parking spaces."""
     centre: list[Solid] = []
     bars: list[Solid] = []
     stops: list[Solid] = []
@@ -175,7 +177,7 @@ def paint(x: Sequence[float], y: Sequence[float], dash: tuple[float, float] = (3
 
 
 def spaces(start: float, stop: float) -> Iterator[tuple[int, float]]:
-    """Middles of the spaces to park in along a stretch of road, on both sides of it (-1, 1)."""
+    """Middles of the parking spaces along a stretch of road, on both sides of it (-1, 1)."""
     count = int((stop - start - 6.0) // SPACE)
     first = (start + stop) / 2 - (count - 1) * SPACE / 2
     for side in (-1, 1):
@@ -183,7 +185,7 @@ def spaces(start: float, stop: float) -> Iterator[tuple[int, float]]:
 
 
 def bays(x: Sequence[float], y: Sequence[float]) -> Iterator[Bay]:
-    """Every space to park in, headed as a car that drives on the right."""
+    """Every parking space, heading like a car that drives on the right."""
     for axis, at, start, stop in _stretches(x, y):
         for side, place in spaces(start, stop):
             off = at + side * (LANE + BAY / 2)
@@ -194,7 +196,7 @@ def bays(x: Sequence[float], y: Sequence[float]) -> Iterator[Bay]:
 
 
 def pavements(x: Sequence[float], y: Sequence[float]) -> tuple[Lane, ...]:
-    """The way that people take around every block."""
+    """The walking lane around every block."""
     inset, width = WALK
     return tuple(
         Lane(f"pavement_{block.column + 1}_{block.row + 1}", _points(ring(block, inset, 6), STEP), width, closed=True)
@@ -207,7 +209,7 @@ def _points(line: Float, z: float) -> tuple[tuple[float, float, float], ...]:
 
 
 def lanes(x: Sequence[float], y: Sequence[float]) -> tuple[Lane, ...]:
-    """Closed lanes, one around every block, which keep it on the right and so meet no other; and straight ones along the
+    """Closed lanes, one around every block, with the block on their right, so that none meet; and straight lanes along the
     roads, to +y and -y, +x and -x.
     """
     found: list[Lane] = []

@@ -1,4 +1,4 @@
-"""A house put together: blocks of four facades under a roof, and the fittings on them."""
+"""A complete house: blocks of four facades under a roof, and their fittings."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ FLOOR = 0.18
 """Height of the ground floor above the ground, metres."""
 
 SEAM = FLOOR + STOREY + 0.5
-"""Height at which the upper storey's wall begins where it differs from the wall below, metres."""
+"""Height at which the upper storey's wall begins if it differs from the wall below, metres."""
 
 
 @dataclass(frozen=True)
@@ -87,7 +87,7 @@ def _wall_image(kind: str, color: tuple[float, float, float], rng: np.random.Gen
 
 
 def fabric(p: House) -> Fabric:
-    """The materials that the parameters ask for."""
+    """The materials for the parameters."""
     trim = Material("trim", linear(p.trim_color), roughness=0.5)
     dark = sum(p.trim_color) < 1.5
     shutter = coated("shutter", p.door_color, "matte") if p.shutters else None
@@ -206,7 +206,7 @@ def _two_tone(wall: Solid, f: Fabric) -> list[Piece]:
 
 
 def _wing(p: House, plan: Layout, f: Fabric, height: float, rng: np.random.Generator) -> list[Piece]:
-    """A gabled block before the front; its roof runs back into the main one."""
+    """A gabled block in front of the house; its roof runs back into the main one."""
     w, rise = plan.wing_width, 0.85 * p.slope * plan.wing_width / 2
     low = height if p.storeys == 2 else height - 0.05
     deep = WING + p.depth / 2

@@ -1,4 +1,4 @@
-"""Meadows, hills, woods and far houses around a street."""
+"""Meadows, hills, woods and distant houses around a street."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ from viewsphere_zoo.townscape.surfaces import Tint, cuboid, prism, waves
 from viewsphere_zoo.townscape.textures import textured
 
 FAR = 150.0
-"""Beyond this distance grass has no grain any more, only its colour, which fades into the air."""
+"""Distance beyond which grass has no grain, only a colour that fades into the haze, metres."""
 
 NEAR = 60.0
-"""Woods nearer to the gardens than this show leaves."""
+"""Distance from the gardens below which woods show leaves, metres."""
 
 GRASS = textured("grass", 0, 2.6, 0.95)
 ASPHALT = textured("asphalt", 1, 2.2, 0.92)
@@ -36,9 +36,9 @@ AIR = srgb.linear((0.66, 0.74, 0.82))
 
 @dataclass(frozen=True)
 class Relief:
-    """The lie of the land: flat at the street or town in its middle, rising to a ridge of this height at this distance.
+    """The terrain: flat at the street or town in its middle, rising to a ridge of this height at this distance.
 
-    phases: six random ones; half: half the width and length of what lies in its middle; road: whether a road leads on to both
+    phases: six random ones; half: half the width and length of the area in its middle; road: whether a road continues to both
     ends of Y.
     """
 
@@ -49,11 +49,11 @@ class Relief:
     road: bool = True
 
     def away(self, points: Float) -> Float:
-        """Distance (N,) of points from what lies in the middle, metres."""
+        """Distance (N,) of points from the area in the middle, metres."""
         return np.hypot(np.maximum(np.abs(points[:, 0]) - self.half[0], 0), np.maximum(np.abs(points[:, 1]) - self.half[1], 0))
 
     def height(self, x: Float, y: Float) -> Float:
-        """z over plan points; level across the road."""
+        """Height z over plan points; level across the road."""
         across = np.sign(x) * np.maximum(np.abs(x) - 9.0, 0)
         away = np.hypot(np.maximum(np.abs(x) - self.half[0], 0), np.maximum(np.abs(y) - self.half[1], 0))
         share = np.clip((away - 15) / (self.reach - 15), 0, 1)
@@ -65,7 +65,7 @@ class Relief:
 
 
 def _lines(inner: list[float], reach: float) -> Float:
-    """Grid lines that spread with distance, mirrored."""
+    """Grid lines with spacing that grows with distance, mirrored."""
     out = inner[-1] + (reach - inner[-1] + 120) * np.linspace(0, 1, 19)[1:] ** 1.8
     half = np.concatenate([inner, out])
     return np.concatenate([-half[::-1], half[half > 0]])
@@ -131,15 +131,15 @@ def _crown(relief: Relief, x: float, y: float, size: float, rng: np.random.Gener
 
 
 def around(points: Float) -> Float:
-    """uv (N, 2) of points: metres along the horizon seen from the origin, and down; for leaves on woods, never seen from
-    behind.
+    """uv (N, 2) of points: metres along the horizon seen from the origin, and down. Used for leaves on woods, which are never
+    seen from behind.
     """
     reach = np.hypot(points[:, 0], points[:, 1])
     return np.stack([reach * np.arctan2(points[:, 1], points[:, 0]), -points[:, 2]], axis=1)
 
 
 def houses(relief: Relief, count: int, rng: np.random.Generator) -> list[Piece]:
-    """Plain houses far off."""
+    """Plain, distant houses."""
     walls = [Material(f"far_wall_{i}", linear(c), roughness=0.95) for i, c in enumerate(_WALLS)]
     roofs = [Material(f"far_roof_{i}", linear(c), roughness=0.95) for i, c in enumerate(_ROOFS)]
     glass = Material("far_window", linear((0.2, 0.23, 0.26)), roughness=0.2)
@@ -175,7 +175,7 @@ def images(rng: np.random.Generator) -> list[Image]:
 
 
 def tints(relief: Relief, rng: np.random.Generator) -> dict[str, Tint]:
-    """Fields on the hills, woods in several greens; both fade into the air with distance."""
+    """Fields on the hills, woods in several greens; both fade into the haze with distance."""
     near, fields, leaves = rng.spawn(3)
     mean = 0.88 * srgb.linear(turf().pixels[..., :3] / 255.0).mean(axis=(0, 1))
 

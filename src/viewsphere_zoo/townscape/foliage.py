@@ -28,7 +28,7 @@ def ball(level: int) -> Solid:
 
 
 def _split(points: Float, faces: NDArray[np.int64]) -> tuple[Float, NDArray[np.int64]]:
-    """Each triangle in four, the new vertices on the sphere."""
+    """Each triangle split into four, with the new vertices on the sphere."""
     edges = np.sort(np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]), axis=1)
     unique, index = np.unique(edges, axis=0, return_inverse=True)
     middle = points[unique].mean(axis=1)

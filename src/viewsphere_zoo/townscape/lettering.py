@@ -48,7 +48,7 @@ _GLYPHS = {
 
 
 def lettering(text: str, height: float, depth: float = 0.02, most: float = np.inf) -> Solid:
-    """The text in the plane y = 0, its middle at the origin, raised towards -Y; narrower letters where it exceeds `most`."""
+    """The text in the plane y = 0, its middle at the origin, raised towards -Y; narrower letters if it exceeds `most`."""
     rows = np.hstack([np.hstack([_glyph(c), np.zeros((7, 1), bool)]) for c in text])[:, :-1]
     tall = height / 7
     wide = min(tall, most / rows.shape[1])

@@ -47,7 +47,7 @@ class Joinery:
 def facade(
     width: float, height: float, openings: list[Opening], gable: float = 0.0, seam: float = 0.0, reveal: float = REVEAL
 ) -> Solid:
-    """The wall with its reveals, as deep as `reveal`, a gable of this height on top; no triangle crosses the level line at
+    """The wall with its reveals, `reveal` deep, and a gable of this height on top; no triangle crosses the level line at
     `seam`.
     """
     spans = [(o.x - o.width / 2, o.x + o.width / 2, o.z, o.z + o.height) for o in openings]

@@ -67,7 +67,7 @@ def tints(rng: np.random.Generator, wear: float) -> dict[str, Tint]:
 
 
 def meadow(rng: np.random.Generator, points: Float) -> Float:
-    """Factors (N, 3) of the grass' colour, since grass is not equally green everywhere."""
+    """Factors (N, 3) of the grass' colour, for grass that is not equally green everywhere."""
     light, dry = waves(rng, points[:, :2], 9.0), waves(rng, points[:, :2], 16.0)
     shade = 0.9 + 0.09 * light
     return np.stack([shade, shade - 0.02, shade - 0.06 - 0.05 * dry], axis=1)

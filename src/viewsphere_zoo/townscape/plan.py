@@ -1,4 +1,4 @@
-"""The measures on which streets, gardens and the country around them agree, metres from the middle of the road."""
+"""The measures shared by streets, gardens and the country around them, metres from the middle of the road."""
 
 ROAD = 3.25
 """Half the road's width, gutters included."""

@@ -51,7 +51,9 @@ def allotted(
     pool: dict[int, House],
     rng: np.random.Generator,
 ) -> list[Plot]:
-    """A plot for each middle: a house (a seed of `pool`) other than next door's; a garage, if any, is at the driveway."""
+    """A plot for each middle: a house (a seed of `pool`) different from the one next door; a garage, if any, is at the
+    driveway.
+    """
     plots: list[Plot] = []
     for y, driveway in zip(middles, driveways, strict=True):
         near = -side if driveway > y else side

@@ -1,4 +1,4 @@
-"""Things on a road: painted lines, manhole covers, drains, patches. All thin slabs, at least 3 mm apart in height."""
+"""Things on a road: painted lines, manhole covers, drains, patches. All are thin slabs, at least 3 mm apart in height."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 """A shop's front on a ground floor: windows and door between pilasters, the sign above them, an awning, a hanging sign.
 
-As facades do, it lies in y = 0 and faces -Y, its middle at x = 0, its foot at z = 0.
+Like a facade, it is in y = 0 and faces -Y, its middle at x = 0, its foot at z = 0.
 """
 
 from __future__ import annotations
@@ -75,7 +75,7 @@ def shop_pieces(p: Shop, c: ShopCoats, rng: np.random.Generator) -> list[Piece]:
 
 
 def _windows(p: Shop, c: ShopCoats, rng: np.random.Generator) -> list[Piece]:
-    """Panes over a riser, and a glazed door where the plan has it."""
+    """Panes over a riser, and a glazed door at its position in the plan."""
     b = bay(p)
     x0, door = b.x - b.width / 2, 1.05
     start = x0 + {"left": 0.1, "middle": (b.width - door) / 2, "right": b.width - door - 0.1}[p.door]

@@ -1,4 +1,4 @@
-"""The traffic that places with roads have of their own: parked vehicles in their bays, people on their pavements."""
+"""The traffic of places with roads: parked vehicles in their bays, people on their pavements."""
 
 from __future__ import annotations
 
@@ -12,25 +12,25 @@ from viewsphere.model.scene import Matrix4
 from viewsphere_zoo.families.car import SIZES, Car
 
 CLEAR = 10.0
-"""Metres around the origin in which bays stay empty: models and cameras are there."""
+"""Radius around the origin in which bays stay empty for models and cameras, metres."""
 
 PERSON = 0.6
-"""Metres that a walking person takes up to each side of their middle, arms and stride included."""
+"""Radius around a walking person's middle, metres, including arms and stride."""
 
 BUMPERS = 0.1
-"""Metres by which a car with its bumpers is longer than its body, at most; 0.05 among 40 of the zoo's."""
+"""Greatest length that bumpers add to a car's body, metres; 0.05 among 40 of the zoo's cars."""
 
 TRIES = 50
-"""Spots that are tried for one person; a person without room is left out."""
+"""Number of spots to try for one person; a person without room is left out."""
 
 MIRROR = 0.1
-"""Metres by which a car with its mirrors reaches beyond its bay on each side."""
+"""Distance by which a car with its mirrors extends beyond its bay on each side, metres."""
 
 TUFT = 0.2
-"""Metres by which leaves hang below a crown's lower edge, and roof racks reach above a roof."""
+"""Distances by which leaves hang below a crown's lower edge and roof racks rise above a roof, metres."""
 
 Crown = tuple[float, float, float, float]
-"""A tree's crown: x, y, radius, and height of its lower edge above the ground that bays are on, metres."""
+"""A tree's crown: x, y, radius, and height of its lower edge above the ground of the bays, metres."""
 
 Disc = tuple[float, float, float]
 """A thing beside the road: x, y and radius, metres."""
@@ -43,8 +43,8 @@ def parked(
     design: Callable[[], tuple[int, Car]],
     crowns: Sequence[Crown] = (),
 ) -> Iterator[tuple[int, Matrix4]]:
-    """The car of each bay that is taken, and world from car: nearly in the bay's middle, headed as the bay is. `design` draws
-    a car's seed and parameters. Bays whose car a tree's crown would reach into stay empty.
+    """The car of each occupied bay, and world from car: nearly in the bay's middle, with the bay's heading. `design` draws
+    a car's seed and parameters. Bays stay empty if a tree's crown would reach into their car.
     """
     for bay in bays:
         frame = bay.world_from_bay
@@ -58,7 +58,7 @@ def parked(
 
 
 def _reaches_into(bay: Bay, crown: Crown, height: float) -> bool:
-    """True if a crown reaches into a car of this height in a bay."""
+    """Return whether a crown reaches into a car of this height in a bay."""
     x, y, radius, clear = crown
     frame, (width, length) = bay.world_from_bay, bay.size
     dx, dy = x - frame[0][3], y - frame[1][3]
@@ -68,7 +68,9 @@ def _reaches_into(bay: Bay, crown: Crown, height: float) -> bool:
 
 
 def walkers(rng: np.random.Generator, pavements: Sequence[Lane], count: int, others: Sequence[Disc]) -> Iterator[Matrix4]:
-    """World from person for people on pavements, either way, uniform along them and clear of others and of one another."""
+    """World from person for people on pavements, walking either way, uniform along them and clear of obstacles and of one
+    another.
+    """
     if not count or not pavements:
         return
     parts = np.array([part for lane in pavements for part in stretches(lane)])
@@ -88,6 +90,6 @@ def walkers(rng: np.random.Generator, pavements: Sequence[Lane], count: int, oth
 
 
 def _moved(frame: Matrix4, x: float, y: float) -> Matrix4:
-    """A frame whose origin is at x and y of another one."""
+    """A frame with its origin moved to x and y of another frame."""
     rows: list[tuple[float, float, float, float]] = [(a, b, c, t + a * x + b * y) for a, b, c, t in frame[:3]]
     return (*rows, frame[3])  # type: ignore[return-value]

@@ -1,4 +1,4 @@
-"""From assembled triangles to textured, weathered surfaces: uv in metres and vertex colours."""
+"""Textured, weathered surfaces from assembled triangles: uv in metres and vertex colours."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from viewsphere_zoo.shapes.assembly import Piece, assemble
 from viewsphere_zoo.shapes.solids import Float, Solid
 
 LEVEL = 0.985
-"""z of the unit normal beyond which a surface takes its uv from above."""
+"""Greatest z of the unit normal before a surface takes its uv from above."""
 
 Tint = Callable[[Float], Float]
 """Maps points (N, 3) to factors (N,) or (N, 3) of the base colour, linear, 0..1."""
@@ -30,7 +30,9 @@ def finished(
 
 
 def planar_uv(mesh: Mesh) -> np.ndarray[tuple[int, ...], np.dtype[np.float32]]:
-    """Metres across and down each vertex' tangent plane, (V, 2) float32: level surfaces (x, -y), others along their contour."""
+    """The uv in metres across and down each vertex' tangent plane, (V, 2) float32: level surfaces (x, -y), others along their
+    contour.
+    """
     p, n = mesh.vertices.astype(np.float64), mesh.normals.astype(np.float64)
     level = np.abs(n[:, 2]) > LEVEL
     across = np.stack([-n[:, 1], n[:, 0], np.zeros(len(n))], axis=1)
@@ -61,7 +63,7 @@ def _colors(mesh: Mesh, tints: dict[str, Tint]) -> np.ndarray[tuple[int, ...], n
 
 
 def waves(rng: np.random.Generator, points: Float, length: ArrayLike, count: int = 7) -> Float:
-    """Smooth noise (N,), about -1..1, at points (N, D): waves of about this length (metres) in random directions."""
+    """Smooth noise (N,), about -1..1, at points (N, D): a sum of waves of about this length (metres) in random directions."""
     size = points.shape[1]
     direction = rng.standard_normal((count, size))
     direction /= np.linalg.norm(direction, axis=1, keepdims=True)

@@ -49,7 +49,7 @@ def images(p: Shop, rng: np.random.Generator) -> list[Image]:
 
 
 def fabric(p: Shop) -> Fabric:
-    """The materials that the parameters ask for."""
+    """The materials for the parameters."""
     frame = Material("window_frame", linear(p.frame_color), roughness=0.4)
     glass = Material("glass", linear((0.2, 0.24, 0.27)), roughness=0.05, clearcoat=1.0)
     trim = Material("stone_trim", linear(p.trim_color), roughness=0.8)
@@ -171,7 +171,7 @@ def _quoins(p: Shop) -> Solid:
 
 
 def _balconies(p: Shop, flats: list[Opening], f: Fabric) -> list[Piece]:
-    """Iron rails before the tall windows, some on slabs."""
+    """Iron rails in front of the tall windows, some on slabs."""
     rails: list[Solid] = []
     slabs: list[Solid] = []
     for o in flats:
@@ -205,7 +205,7 @@ def _back(p: Shop, f: Fabric, rng: np.random.Generator) -> list[Piece]:
 
 
 def _cornice(p: Shop, f: Fabric, z: float) -> list[Piece]:
-    """Steps that lean out over the street, with blocks below them."""
+    """Stepped mouldings that project over the street, with blocks below them."""
     half, y = p.width / 2, -p.depth / 2
     steps = [
         cuboid((-half, y - d, z + h), (half, y + 0.02, z + h + 0.1)) for d, h in ((0.1, -0.36), (0.2, -0.12), (0.3, -0.03))
@@ -233,7 +233,7 @@ def _flat(p: Shop, f: Fabric, rng: np.random.Generator) -> list[Piece]:
 
 
 def _pitched(p: Shop, f: Fabric, rng: np.random.Generator) -> list[Piece]:
-    """Two slopes with the ridge along the street, party walls that stand up through them."""
+    """Two slopes with the ridge along the street, party walls that rise above them."""
     half, run, rise = p.width / 2, p.depth / 2, p.slope * p.depth / 2
     profile = [(-run - 0.25, -0.25 * p.slope), (0.0, rise), (0.0, rise + 0.18), (-run - 0.25, -0.25 * p.slope + 0.18)]
     slope = prism(profile, -half + 0.02, half - 0.02, axis=0)

@@ -1,6 +1,6 @@
 """Tileable pictures of building materials, drawn by numpy: (N, N, 4) uint8 sRGB, row 0 on top, opaque.
 
-Every function takes the generator that its grain is drawn from and returns one tile; `textured` sets a tile's size in metres.
+Every function takes the generator for its grain and returns one tile; `textured` sets a tile's size in metres.
 """
 
 from __future__ import annotations
@@ -21,7 +21,9 @@ def textured(name: str, image: int, metres: float, roughness: float = 0.9, tint:
 
 
 def noise(rng: np.random.Generator, size: int, grain: float, stretch: float = 1.0) -> Float:
-    """Tileable noise (size, size), mean 0, deviation 1; grain: radius of blobs, pixels; stretch: times longer across."""
+    """Tileable noise (size, size), mean 0, deviation 1; grain: radius of blobs, pixels; stretch: how many times longer the
+    blobs are across.
+    """
     f = np.fft.fftfreq(size)
     u, v = f[: size // 2 + 1] * stretch, f[:, None]
     u = np.abs(u)

@@ -51,7 +51,7 @@ ENGINE = "cycles"
 
 
 def check() -> None:
-    """Raise UserError where there is no Blender."""
+    """Raise UserError if Blender is missing."""
     plugins.load(EngineSpec, ENGINE).check({})
 
 
@@ -64,9 +64,9 @@ def refuses(scope: Scope) -> Iterator[str]:
 def writer(dataset: Dataset, folder: Path, note: Callable[[str], None]) -> Generator[Callable[[Sample], None]]:
     """Write the frames that have a camera; notes name everything that Blender's files cannot hold.
 
-    Blender needs all frames of a scene at once: first only each frame's place is noted, and after the last frame the samples
-    of one scene after another are read again. Raises UserError where Blender cannot be used or no frame can be written,
-    ModelError for scenery that cannot be read any more.
+    Blender needs all frames of a scene at once. The writer therefore first notes only each frame's place. After the last frame
+    it reads the samples again, scene by scene. Raises UserError if Blender cannot be used or no frame can be written,
+    ModelError for scenery that has become unreadable.
     """
     groups: dict[object, _Group] = {}
     places = ((key, place) for key, places in dataset.shots() for place in places)
@@ -84,8 +84,8 @@ def writer(dataset: Dataset, folder: Path, note: Callable[[str], None]) -> Gener
 
 
 def is_camera_view(sample: Sample) -> bool:
-    """Return whether a frame can be written: it is a camera's, not a LiDAR's, and this, models and where they stand are
-    known.
+    """Return whether a frame can be written: its sensor is a camera, not a LiDAR, and the camera, the models and their
+    positions are known.
     """
     if not (sample.known_camera and sample.known_pose and sample.objects):
         return False
@@ -93,7 +93,7 @@ def is_camera_view(sample: Sample) -> bool:
 
 
 def _left_out(dataset: Dataset, groups: Collection[_Group]) -> Iterator[str]:
-    """Notes about frames that are not written, or not as they were rendered."""
+    """Notes about frames that are left out or differ from their rendering."""
     total = len(dataset)
     written = sum(len(places) for group in groups for places in group.places.values())
     needs = "cameras, models and where they stand"
@@ -138,7 +138,7 @@ def _views(dataset: Dataset, group: _Group) -> Iterator[tuple[Shot, Instant, Sam
 
 
 def _stored(dataset: Dataset, key: str) -> tuple[Shot | None, bytes]:
-    """A shot (None if it is not known), and a digest that is equal for shots of one scene."""
+    """A shot (None if unknown), and a digest that is equal for all shots of one scene."""
     shot = dataset.store.shot(key)
     return shot, _alike(shot) if shot else b""
 
@@ -150,7 +150,7 @@ def _scene(known: Shot | None, alike: bytes, key: str, place: int, sample: Sampl
 
 
 def _taken(known: Shot | None, key: str, place: int, sample: Sample) -> tuple[Shot, int]:
-    """The shot of a sample, whose rig is the sample's own sensor alone, and its instant there."""
+    """The shot of a sample, with its rig reduced to the sample's sensor, and the sample's instant in it."""
     if known is None:
         return _lit_anyhow(key, sample), 0
     _, instant, number = next(islice(known.samples, place, None))
@@ -183,7 +183,7 @@ def _seen(shot: Shot, instant: int, sample: Sample) -> tuple[object, ...]:
 
 
 def _lit_anyhow(key: str, sample: Sample) -> Shot:
-    """A shot in the default light, for an imported frame of which only objects and camera are known."""
+    """A shot in the default light, for an imported frame with only its objects and camera known."""
     return Shot(
         key=key,
         things=tuple(Thing(id=o.id, model=_spec(o.key, ""), motion=Motion.still(_matrix(o))) for o in sample.objects),
@@ -218,8 +218,8 @@ def _spec(key: str, source: str) -> ModelSpec:
 
 @dataclass(frozen=True, eq=False)
 class StoredModels:
-    """Normalised meshes: of objects, by `keys` of the data set (a model's, and that of what is shown of it), what it keeps of
-    them; of scenery, what its source gives.
+    """Normalised meshes. Objects use the data set's stored mesh by `keys` (the key of a model, and the key of its shown time
+    step); scenery uses the mesh from its source.
     """
 
     dataset: Dataset
@@ -228,7 +228,7 @@ class StoredModels:
     @classmethod
     def of(cls, dataset: Dataset, shot: Shot, sample: Sample) -> StoredModels:
         """Return the models that a sample of a shot shows."""
-        there = {o.id: o for o in sample.objects}  # a sample of a sequence lacks what is not there
+        there = {o.id: o for o in sample.objects}  # a sample of a sequence lacks objects that are not present
         shown = ((thing, there[thing.id]) for thing in shot.objects if thing.id in there)
         return cls(dataset, {(thing.model, thing.step): (o.track or o.key, o.key) for thing, o in shown})
 
@@ -252,7 +252,7 @@ FORMAT = FormatSpec(
     holds=("the scene itself",),
     read_by=("Blender",),
     channels=(),
-    keeps_all_objects=True,  # what is hidden is part of a scene, too
+    keeps_all_objects=True,  # hidden objects are part of a scene, too
     names_credits=False,
     refuses=refuses,
     check=check,

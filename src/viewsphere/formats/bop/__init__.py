@@ -95,16 +95,16 @@ class Options(Frozen):
 
 KINDS = (".png", ".jpg")
 SCENE = 1000
-"""Still pictures of a scene, and pictures of a shard."""
+"""Numbers of still pictures in a scene, and of pictures in a shard."""
 
 
 def needs(options: Options) -> tuple[str, ...]:
-    """Whole masks, which all layouts have."""
+    """The required labels: whole masks, which all layouts contain."""
     return ("amodal",)
 
 
 def refuses(scope: Scope, options: Options) -> Iterator[str]:
-    """Cameras that nobody knows, lenses that K does not describe, and objects without their whole masks."""
+    """Reasons to refuse: unknown cameras, lenses that K does not describe, and objects without whole masks."""
     yield from lacking_labels(scope, needs(options))
     yield from known_cameras(scope)
     yield from pinhole(scope)
@@ -155,7 +155,7 @@ class Bop(Tree):
             yield item(f"{folder}/scene_gt_coco.json", annotation, "annotations")
 
     def _imagewise(self, sample: Sample, found: list[Entry]) -> Iterator[tuple[str, Content]]:
-        """Yield the key of each file of a picture, the part of its name behind the picture's key, with the file's content."""
+        """Yield each file of a picture: the part of its name after the picture's key, and its content."""
         yield f"rgb{suffix_of(sample, *KINDS)}", picture(sample, *KINDS)
         yield "depth.png", depth_file(sample, self._options.depth_scale)
         yield "camera.json", json_bytes(camera(sample, self._options.depth_scale))
@@ -178,7 +178,7 @@ class Bop(Tree):
         return self.dataset.read(content) if isinstance(content, str) else content
 
     def rest(self) -> Iterator[File]:
-        """Models, and what is said of the whole data set."""
+        """The models, and the files about the whole data set."""
         models: dict[str, Any] = {}
         for info in self.dataset.models:
             mesh, number = self.dataset.mesh(info.key), self._numbers[info.key]

@@ -1,4 +1,4 @@
-"""BOP's scenes with the models that they are of, to be rendered again."""
+"""BOP's scenes with the models that they show, for rendering them again."""
 
 from __future__ import annotations
 
@@ -30,18 +30,20 @@ from viewsphere.truth.raster.geometry import build_geometry
 from viewsphere.truth.raster.visibility import rasterize
 
 MOST = 12
-"""Masks that are compared, evenly over all."""
+"""Number of masks to compare, spread evenly over all masks."""
 
 CLEARLY = 0.5
-"""A shift is believed where it leaves less than this share of the pixels that differ."""
+"""A shift is accepted if it leaves less than this share of the differing pixels."""
 
 LEAST = 100
-"""Pixels of a mask that is compared."""
+"""Least number of pixels in a mask to compare."""
 
 STARTS = ((0.0, 0.0), (-0.5, -0.5))
 STEP = 0.125
 MOST_STEPS = 8
-"""Of a search from the better start on, in parts of a pixel, to whichever neighbour fits best."""
+"""Limits of the search from the better start: its step, pixels, and its greatest number of steps to the best-fitting
+neighbour.
+"""
 
 Shift = tuple[float, float]
 
@@ -114,7 +116,7 @@ def _shifted(shot: ListedShot, shift: Shift) -> ListedShot:
 
 
 def _models(root: Path, frames: tuple[Frame, ...]) -> tuple[dict[str, SourceModel], list[str]]:
-    """The models by their numbers, and notes on what is left out."""
+    """The models by their numbers, and notes on omissions."""
     files = model_files(root)
     for frame in frames:
         for one in frame.gt:
@@ -148,8 +150,8 @@ class Fit:
 
 
 def _fit(frames: Sequence[Frame], models: Mapping[str, SourceModel]) -> Fit:
-    """The shift that whole masks have against the models in their poses; none where that is not clear, or where there are no
-    masks. Raises ModelError for models that cannot be read, StoreError for masks that are none.
+    """The shift of whole masks against the models in their poses; zero if it is unclear or if there are no masks. Raises
+    ModelError for unreadable models, StoreError for invalid masks.
     """
     masks = [(frame, n, mask) for frame, n in _chosen(frames) if np.count_nonzero(mask := _mask(frame, n)) >= LEAST]
     if not masks:
@@ -177,7 +179,7 @@ def shifted(lens: Intrinsics, shift: Shift) -> Intrinsics:
 
 
 def _chosen(frames: Sequence[Frame]) -> Iterator[tuple[Frame, int]]:
-    """Some objects that have masks, and the pictures that show them."""
+    """A selection of objects with masks, and the pictures that show them."""
     every = max(1, len(frames) // MOST)
     chosen = [(frame, n) for frame in frames[::every] for n in range(len(frame.gt)) if _file(frame, n).is_file()]
     yield from chosen[:: max(1, len(chosen) // MOST)][:MOST]

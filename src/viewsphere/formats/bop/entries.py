@@ -26,14 +26,14 @@ MILLIMETRES = np.diag([MM, MM, MM, 1.0])
 
 
 LEAST_VISIBLE = 0.1
-"""Visible share from which an object counts in BOP's evaluations."""
+"""Least visible share of an object that counts in BOP's evaluations."""
 
 NO_BOX = [-1, -1, -1, -1]
 
 
 @dataclass(frozen=True, eq=False)
 class Entry:
-    """An object of a picture as BOP has it: pose, visibility, both masks."""
+    """An object of a picture in BOP's terms: pose, visibility, both masks."""
 
     pose: dict[str, Any]
     info: dict[str, Any]
@@ -42,7 +42,7 @@ class Entry:
 
 
 def camera(sample: Sample, scale: float) -> dict[str, Any]:
-    """K by pixel centres, the steps of depth in mm, and the camera's pose in mm."""
+    """The camera's record: K with pixel centres, the depth step in mm, and the camera's pose in mm."""
     own = sample.camera
     k = own.K - np.array([[0, 0, 0.5], [0, 0, 0.5], [0, 0, 0]])
     return {
@@ -54,26 +54,26 @@ def camera(sample: Sample, scale: float) -> dict[str, Any]:
 
 
 def sensor(lens: Intrinsics, scale: float) -> dict[str, Any]:
-    """The lens by pixel centres, as camera.json has it."""
+    """The lens with pixel centres, as in camera.json."""
     k = {"fx": lens.fx, "fy": lens.fy, "cx": lens.cx - 0.5, "cy": lens.cy - 0.5}
     return {**k, "width": lens.width, "height": lens.height, "depth_scale": scale}
 
 
 def depth(sample: Sample, scale: float) -> NDArray[np.uint16]:
-    """Depth along z in steps of `scale` mm, (H, W), 0 where there is none, or more than 65,535 steps."""
+    """Depth along z in steps of `scale` mm, (H, W); 0 for no depth or more than 65,535 steps."""
     metres = scale / MM
     steps = depth_steps(sample, metres)
     return np.where(sample.channels["depth"] < 65535.5 * metres, steps, 0).astype(np.uint16)
 
 
 def depth_file(sample: Sample, scale: float) -> Coded:
-    """The same as a PNG."""
+    """The depth of `depth`, as a PNG."""
     return Coded(sample.index, f"bop depth {scale!r}.png", lambda: encode_png(depth(sample, scale)))
 
 
 def entries(sample: Sample, numbers: Mapping[str, int], scale: float) -> list[Entry]:
-    """Return every object that has pixels in the picture, seen or hidden. Raises UserError where an imported picture lacks
-    depth, or an object its whole mask.
+    """Return every object with pixels in the picture, visible or hidden. Raises UserError if an imported picture lacks depth,
+    or an object its whole mask.
     """
     if "depth" not in sample.channels:
         raise UserError(f"frame {sample.index}: expected channel depth; found none")
@@ -85,7 +85,7 @@ def entries(sample: Sample, numbers: Mapping[str, int], scale: float) -> list[En
 
 
 def _inside(sample: Sample, o: ObjectAnnotation) -> int:
-    """Number of an object's pixels in the picture, hidden ones too; raises UserError where nobody knows."""
+    """Number of an object's pixels in the picture, including hidden ones. Raises UserError if it is unknown."""
     whole: Rle | None = getattr(o, "amodal", None)
     inside = 0 if whole is None else rle_area(whole.height, whole.width, whole.counts)
     if whole is None or (inside and math.isnan(o.visibility + o.truncation)):
@@ -103,7 +103,7 @@ def pose(o: ObjectAnnotation, numbers: Mapping[str, int]) -> dict[str, Any]:
 
 
 def _info(o: ObjectAnnotation, inside: int, valid: NDArray[np.bool_], width: int, height: int) -> dict[str, Any]:
-    """Pixels and boxes as BOP's calc_gt_info.py counts them; `inside` of the object's pixels lie in the picture."""
+    """Pixels and boxes as BOP's calc_gt_info.py counts them; `inside` is the number of the object's pixels in the picture."""
     whole = round(o.area / o.visibility) if o.area else round(inside / (1 - o.truncation))
     measured = inside if valid.all() else int((decode_rle(height, width, o.amodal.counts) & valid).sum())
     return {
@@ -117,7 +117,7 @@ def _info(o: ObjectAnnotation, inside: int, valid: NDArray[np.bool_], width: int
 
 
 def _bop_box(corners: tuple[int, int, int, int] | None) -> list[int]:
-    """x, y of the first pixel, and how far from it the last one is: BOP's widths are a pixel too small."""
+    """x and y of the first pixel, and the distance to the last one: BOP's widths are a pixel too small."""
     assert corners is not None
     x0, y0, x1, y1 = corners
     return [x0, y0, x1 - x0 - 1, y1 - y0 - 1]
@@ -128,7 +128,7 @@ def _silhouette_box(o: ObjectAnnotation, width: int, height: int) -> tuple[int, 
     seen = rle_box(height, width, o.amodal.counts)
     if not o.truncation or o.box2d_unclipped is None or seen is None:
         return seen
-    x0, y0, x1, y1 = np.ceil(np.array(o.box2d_unclipped) - 0.5).astype(int).tolist()  # pixels whose centres it holds
+    x0, y0, x1, y1 = np.ceil(np.array(o.box2d_unclipped) - 0.5).astype(int).tolist()  # pixels whose centres are inside
     return (
         min(seen[0], max(x0, -width)),
         min(seen[1], max(y0, -height)),
@@ -157,7 +157,7 @@ def targets(scene: int, image: int, found: list[Entry]) -> list[dict[str, int]]:
 
 
 def coco(found: list[Entry], image: int, ids: list[int]) -> list[dict[str, Any]]:
-    """The visible objects as COCO has them: run lengths of what is seen, boxes around all that lies in the picture."""
+    """The visible objects in COCO's terms: run lengths of the visible pixels, boxes around all pixels in the picture."""
     return [
         {
             "id": number,
@@ -184,7 +184,7 @@ def _corner_and_size(mask: Rle) -> list[int]:
 
 
 def ply(mesh: Mesh) -> bytes:
-    """The vertices that triangles use, mm, with normals, and the triangles, in ASCII."""
+    """An ASCII PLY file: the vertices used by triangles, mm, with normals, and the triangles."""
     used, corners = np.unique(mesh.triangles, return_inverse=True)
     table = np.hstack([mesh.vertices[used] * np.float64(MM), mesh.normals[used]])
     head = ["ply", "format ascii 1.0", f"element vertex {len(used)}"]

@@ -1,4 +1,4 @@
-"""Reads BOP's data sets of scenes: what they say of their pictures, with poses, depth and masks."""
+"""Reads BOP's data sets of scenes: pictures with their poses, depth and masks."""
 
 from __future__ import annotations
 
@@ -32,10 +32,10 @@ from viewsphere.store.paths import file_inside, is_name
 
 PICTURES = ("rgb/{:06d}.png", "rgb/{:06d}.jpg", "gray/{:06d}.png", "gray/{:06d}.tif")
 MOST_DIGITS = 9
-"""Of an image's number."""
+"""Digits of an image's number."""
 
 MOST_OBJECTS = 10**6
-"""Numbers of objects, which have six digits."""
+"""Limit of object numbers, which have six digits."""
 
 UNKNOWN = np.full((8, 3), np.nan)
 """The box of an object without a model."""
@@ -78,7 +78,7 @@ def read(path: Path, *, keep_going: bool = False) -> ForeignDataset:
 
 @dataclass(frozen=True)
 class Frame:
-    """A picture, what is said of its objects, and where its masks begin: `<scene>/<kind>/<image>_`."""
+    """A picture, the records of its objects, and the start of its masks' paths: `<scene>/<kind>/<image>_`."""
 
     split: str
     scene: Path
@@ -91,7 +91,7 @@ class Frame:
     info: tuple[dict[str, Any], ...]
 
     def mask(self, kind: str, n: int) -> str | None:
-        """Run lengths of a mask, None where there is no such file."""
+        """Run lengths of a mask; None if there is no such file."""
         file = file_inside(self.scene, f"{kind}/{self.image:06d}_{n:06d}.png")
         if not file.is_file():
             return None
@@ -104,7 +104,7 @@ class Frame:
         return encode_rle(mask)
 
     def check(self, file: Path, found: NDArray[Any]) -> None:
-        """Raise StoreError for a file of another size than the picture."""
+        """Raise StoreError for a file whose size differs from the picture's."""
         width, height = self.camera.width, self.camera.height
         if found.shape != (height, width):
             raise StoreError(f"{file}: expected {width} x {height} pixels; found {' x '.join(map(str, found.shape[::-1]))}")
@@ -188,7 +188,7 @@ def object_pose(gt: Mapping[str, Any]) -> NDArray[np.float64]:
 
 
 def _pose(said: Mapping[str, Any], which: str) -> NDArray[np.float64]:
-    """The pose of these names, (4, 4), metres; raises ValueError where it has no rotation."""
+    """The pose under these names, (4, 4), metres. Raises ValueError if its rotation is missing or invalid."""
     turn, shift = _matrix(said[f"cam_R_{which}"], 3), _matrix(said[f"cam_t_{which}"], 1)[0]
     try:
         quaternion_from_matrix(turn)
@@ -229,7 +229,7 @@ def _samples(
 
 
 def _depth(file: Path, frame: Frame) -> bytes:
-    """The same steps, with their length, as the store keeps them."""
+    """A depth map in the same steps, with their length, as the store keeps it."""
     try:
         with opened(file) as image:
             steps = np.asarray(image if image.mode.startswith("I;16") else image.convert("I")).astype(np.uint16)
@@ -240,7 +240,7 @@ def _depth(file: Path, frame: Frame) -> bytes:
 
 
 def _object(frame: Frame, n: int, category: Category, key: str, box: NDArray[np.float64] | None) -> Any:
-    """The n-th object of a picture, of a model with this box (8, 3); `source` has its obj_id."""
+    """The n-th object of a picture, whose model has this box (8, 3); its `source` holds obj_id."""
     size = width, height = frame.camera.width, frame.camera.height
     seen, whole = frame.mask("mask_visib", n), frame.mask("mask", n)
     info = frame.info[n] if n < len(frame.info) else None
@@ -263,6 +263,6 @@ def _object(frame: Frame, n: int, category: Category, key: str, box: NDArray[np.
 
 
 def _corners(box: list[int]) -> tuple[float, float, float, float] | None:
-    """Half-open corners of one of BOP's boxes, whose widths are a pixel too small; None for that of nothing."""
+    """Half-open corners of one of BOP's boxes, whose widths are a pixel too small; None for the box of an invisible object."""
     x, y, w, h = box
     return None if box == NO_BOX else (float(x), float(y), float(x + w + 1), float(y + h + 1))

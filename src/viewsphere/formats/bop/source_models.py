@@ -1,4 +1,4 @@
-"""BOP's models, as others may have made them, and what models_info.json says of them."""
+"""BOP's models from other sources, with their data in models_info.json."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from viewsphere.store.texts import parsed
 from viewsphere.validation.errors import first_of
 
 FOLDERS = ("models", "models_cad", "models_reconst", "models_eval", "models_fine")
-"""The folders in which data sets have their models; the first that exists counts."""
+"""The possible folders of models; the first one that exists is used."""
 
 METRES = np.diag([1 / MM, 1 / MM, 1 / MM, 1.0])
 
@@ -36,7 +36,7 @@ def model_folder(root: Path) -> str:
 
 
 def model_files(root: Path) -> dict[int, Path]:
-    """The files of all models, by their objects' numbers, ascending."""
+    """The files of all models by their objects' numbers, ascending."""
     folder = model_folder(root)
     there = (re.fullmatch(r"obj_(\d{6})\.ply", file.name) for file in sorted((root / folder).glob("obj_*.ply")))
     return {int(match[1]): file_inside(root, f"{folder}/{match[0]}") for match in there if match}
@@ -60,7 +60,7 @@ def model_spec(file: Path) -> ModelSpec:
 def foreign_models(
     root: Path, files: Mapping[int, Path], named: Mapping[int, tuple[Category, str]], problems: list[str]
 ) -> dict[int, ForeignModel]:
-    """The models of objects, by their numbers, of these files; the problems of others are appended."""
+    """The models in these files by their objects' numbers; the problems of invalid models are appended."""
     found: dict[int, ForeignModel] = {}
     try:
         symmetries = {number: one.moved(METRES) for number, one in symmetries_of(root).items()}
@@ -92,7 +92,7 @@ def _symmetries(said: Any, where: str) -> Symmetries | None:
 
 
 def _moving(listed: Any) -> Iterator[list[float]]:
-    """Motions that are not the identity, which some files list, too."""
+    """Motions other than the identity, which some files also list."""
     for motion in listed:
         matrix = np.array(motion, np.float64).reshape(16)
         if np.abs(matrix - np.eye(4).ravel()).max() > RIGID:
@@ -100,7 +100,7 @@ def _moving(listed: Any) -> Iterator[list[float]]:
 
 
 def load(file: Path) -> dict[str, Any]:
-    """One of BOP's JSON files, an object; an empty one where there is no such file. Raises StoreError for another."""
+    """The object in one of BOP's JSON files; empty if there is no such file. Raises StoreError for anything but an object."""
     if not file.is_file():
         return {}
     try:

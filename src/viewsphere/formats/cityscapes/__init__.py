@@ -61,7 +61,7 @@ from viewsphere.plugins.format import FormatSpec
 from viewsphere.store import Dataset
 
 TYPES = 4
-"""Files of a frame in one folder, at most."""
+"""Largest number of files of a frame in one folder."""
 
 
 class Options(Frozen):
@@ -76,7 +76,9 @@ def needs(options: Options) -> tuple[str, ...]:
 
 
 def refuses(scope: Scope, options: Options) -> Iterator[str]:
-    """Rigs of several cameras that are no pair, lenses that camera.json has no numbers for, and more instances than ids."""
+    """Reasons to refuse: rigs of several cameras other than a pair, lenses that camera.json cannot express, and more instances
+    than ids.
+    """
     yield from two_eyes(scope)
     yield from refusals.stereo(scope) if options.stereo else ()
     yield from refusals.known_cameras(scope)
@@ -94,7 +96,7 @@ class Cityscapes(Tree):
         self._labels = labels_of(dataset.classes)
 
     def of(self, sample: Sample) -> Iterator[File]:
-        """A picture; of a left one its camera and labels, too."""
+        """A picture and, for a left one, its camera and labels."""
         side, name = self._eyes.side(sample), self._name(sample)
         yield File(f"{side}Img8bit/{name}_{side}Img8bit.png", picture(sample, ".png"))
         if side == "right":
@@ -116,7 +118,7 @@ class Cityscapes(Tree):
         yield File(f"gtFine/{name}_gtFine_polygons.json", json_bytes(_polygons(sample, drawn)))
 
     def _name(self, sample: Sample) -> str:
-        """Split, city, and what the names of all of a frame's files begin with."""
+        """Split, city, and the common start of the names of a frame's files."""
         if sample.sequence:
             city = sample.sequence.replace("_", "-")
             number, frame = self._timeline.course(sample).number, sample.instant
@@ -132,7 +134,7 @@ def _polygons(sample: Sample, drawn: list[Region]) -> dict[str, Any]:
 
 
 def _disparity(sample: Sample) -> bytes:
-    """Disparity (pixels) as 16 bits, 256 steps a pixel above 1."""
+    """Disparity (pixels) in 16 bits: 256 times the pixels, plus 1."""
     pixels = sample.channels["disparity"].astype(np.float64)
     steps = np.rint(np.where(np.isfinite(pixels), pixels, -1) * 256) + 1
     return encode_png(np.where((steps >= 1) & (steps <= 65535), steps, 0).astype(np.uint16))

@@ -1,4 +1,4 @@
-"""Cityscapes' labels, and which of them the classes of a data set are."""
+"""Cityscapes' labels, and their assignment to the classes of a data set."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ COLORS: Mapping[str, Color] = {
 
 LABELS = tuple(COLORS)
 INSTANCES = range(LABELS.index("person"), len(LABELS))
-"""Labels whose instances are told apart."""
+"""Labels with separate instances."""
 
 _ALSO = {
     "road": "road marking, lane, street",
@@ -78,14 +78,14 @@ _OTHERS = {other: name for name, others in _ALSO.items() for other in others.spl
 
 
 def label_of(one: SemanticClass) -> int:
-    """The id of the label that a class is, by its name; else of `dynamic` for a thing, and of `static` for stuff."""
+    """The id of a class's label, by its name; otherwise the id of `dynamic` for a thing, and of `static` for stuff."""
     name = " ".join(one.name.lower().replace("_", " ").replace("-", " ").split())
     name = _OTHERS.get(name, name)
     return LABELS.index(name if name in COLORS else "dynamic" if one.is_thing else "static")
 
 
 def labels_of(classes: Sequence[SemanticClass]) -> NDArray[np.uint8]:
-    """Labels (N,) by the classes' ids; 0, unlabeled, of numbers that no class has."""
+    """Labels (N,) by the classes' ids; 0 (unlabeled) for numbers without a class."""
     table = np.zeros(1 + max(one.id for one in classes), np.uint8)
     for one in classes:
         table[one.id] = label_of(one)

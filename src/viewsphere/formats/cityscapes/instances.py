@@ -1,4 +1,4 @@
-"""Cityscapes' instances: their numbers, and the polygons that Pillow draws them of."""
+"""Cityscapes' instances: their numbers, and the polygons from which Pillow draws them."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from viewsphere.geometry.mask import mask_polygons
 Ring = NDArray[np.int64]
 
 EACH = 1000
-"""Of a label's id in those of its instances."""
+"""Factor of a label's id in the ids of its instances."""
 
 INSIDE = {(1, 0): (0, 0), (0, 1): (-1, 0), (-1, 0): (-1, -1), (0, -1): (0, -1)}
-"""From the corner at which a step of a clockwise ring begins to the pixel on its right, inside, by the step."""
+"""Offset, for each step of a clockwise ring, from the corner where it begins to the inner pixel on its right."""
 
 
 class Region(NamedTuple):
-    """A region that is drawn at once: label id, number in the instance map, mask (H, W), and rings (N, 2) in pixels."""
+    """A region drawn in one go: label id, number in the instance map, mask (H, W), and rings (N, 2) in pixels."""
 
     label: int
     number: int
@@ -55,12 +55,14 @@ def _rest(labels: NDArray[np.uint8], apart: NDArray[np.integer]) -> Iterator[Reg
 
 
 def _rings(mask: NDArray[np.bool_]) -> list[Ring]:
-    """The rings (N, 2) of a mask's pixels, column and row, of which Pillow's polygons, outlines included, are the mask."""
+    """The rings (N, 2) of a mask's pixels, column and row. Pillow's polygons of these rings, outlines included, reproduce the
+    mask.
+    """
     return [_pixels(np.array(polygon).reshape(-1, 2).astype(np.int64)) for polygon in mask_polygons(mask)]
 
 
 def _pixels(corners: Ring) -> Ring:
-    """The pixels along the inside of a clockwise ring of corners (N, 2), but those within straight lines."""
+    """The pixels along the inside of a clockwise ring of corners (N, 2), without the inner ones of straight lines."""
     moves = np.roll(corners, -1, axis=0) - corners
     lengths = np.abs(moves).sum(axis=1)
     steps = np.sign(moves)

@@ -43,7 +43,7 @@ if TYPE_CHECKING:
     from viewsphere.store import Dataset
     from viewsphere.store.foreign import ForeignDataset
 
-# Plans read no more than the options, so each function imports its code when it is called.
+# Plans read only the options, so each function imports its code when it is called.
 
 
 def writer(
@@ -70,7 +70,7 @@ def verify(dataset: Dataset, folder: Path, sampled: Collection[int], options: Op
 
 
 def read(path: Path, *, keep_going: bool = False) -> ForeignDataset:
-    """A COCO data set that was made elsewhere."""
+    """A COCO data set from another source."""
     from viewsphere.formats.coco.reading import read
 
     return read(path, keep_going=keep_going)

@@ -23,16 +23,16 @@ if TYPE_CHECKING:
     from viewsphere.store import Category, Dataset
 
 KEYPOINTS = "keypoints"
-"""The label whose points are exported where a data set has it."""
+"""The label whose points are exported if a data set has it."""
 
 VISIBLE, HIDDEN = 2, 1
 FLAGS = {0: VISIBLE, 1: HIDDEN}
-"""COCO's v of our states; points that are outside of the picture or behind the camera are not labelled."""
+"""COCO's v for viewsphere's states; points outside the picture or behind the camera are not labelled."""
 
 STATES = {flag: state for state, flag in FLAGS.items()}
 NOT_LABELLED = 3
 Names = Mapping[int, tuple[str, ...]]
-"""Names of the points of each category, by the category's own id."""
+"""Names of the points of each category, by the category's id."""
 
 
 _NAMES = {
@@ -65,7 +65,7 @@ _FIRST_FREE_ID = 91
 
 
 def category_ids(dataset: Dataset, options: Options) -> dict[int, int]:
-    """The exported id of each category of the data set, by its own."""
+    """The exported id of each category, by its id in the data set."""
     if options.category_ids == "contiguous":
         return {category.id: number for number, category in enumerate(dataset.categories, 1)}
     if keeps_ids(dataset):
@@ -74,14 +74,14 @@ def category_ids(dataset: Dataset, options: Options) -> dict[int, int]:
 
 
 def keeps_ids(dataset: Dataset) -> bool:
-    """Return whether any of it was imported, so that categories keep their ids."""
+    """Return whether any part of the data set was imported, so that categories keep their ids."""
     return any(part.frames and not part.settings for part in dataset.plan.parts)
 
 
 def official_ids(categories: tuple[Category, ...]) -> dict[int, int]:
     """COCO's id of each category, or a free one.
 
-    Of two categories with one name of COCO's, the first has it. Free ids follow the recipe's order.
+    If two categories have the same COCO name, the first gets COCO's id. Free ids follow the recipe's order.
     """
     ids: dict[int, int] = {}
     for category in categories:
@@ -91,7 +91,7 @@ def official_ids(categories: tuple[Category, ...]) -> dict[int, int]:
 
 
 def notes(categories: Sequence[Category], options: Options) -> Iterator[str]:
-    """Yield notes on unexpected ids: categories that COCO does not have, or has once."""
+    """Yield notes on unexpected ids: categories that COCO lacks, or that share a single COCO category."""
     if options.category_ids == "contiguous":
         return
     for category, number in zip(categories, official_ids(tuple(categories)).values(), strict=True):
@@ -108,7 +108,7 @@ def _plain(name: str) -> str:
 
 @cache
 def _official() -> dict[str, int]:
-    """COCO's id of each spelling, plain."""
+    """COCO's id for each normalised spelling."""
     ids = {_plain(name): number for name, number in CATEGORY_IDS.items()}
     return ids | {other: CATEGORY_IDS[name] for other, name in _OTHER_SPELLINGS.items()}
 
@@ -137,13 +137,13 @@ class Options(Frozen):
 
 
 def has_label(dataset: Dataset, name: str) -> bool:
-    """Return whether some of a data set's pictures have a label that is given on request."""
+    """Return whether some of a data set's pictures have a label that is computed on request."""
     return any(name in part.recipe.get("annotations", ()) for part in dataset.plan.parts)
 
 
 def point_names(dataset: Dataset) -> Names:
-    """The points of each category, each once: those that it was imported with, then those of its models; of no category
-    that was imported without where the label was not asked for.
+    """The points of each category without duplicates: imported points first, then its models' points. A category imported
+    without points has none unless the label was requested.
     """
     imported, is_asked = imported_categories(dataset), has_label(dataset, KEYPOINTS)
     names: dict[int, tuple[str, ...]] = {}
@@ -156,8 +156,8 @@ def point_names(dataset: Dataset) -> Names:
 
 
 def category_points(dataset: Dataset, category: Category, names: Names, imported: Mapping[str, Any]) -> dict[str, Any]:
-    """A category's fields `keypoints` and `skeleton`, names, and lines between them, which count from 1; and all others that it
-    was `imported` with.
+    """A category's fields `keypoints` (names) and `skeleton` (lines between points, counted from 1), and all other fields from
+    `imported`.
     """
     if category.id not in names:
         return dict(imported)
@@ -171,7 +171,7 @@ def category_points(dataset: Dataset, category: Category, names: Names, imported
 
 
 def named_points(names: Sequence[str], flat: Sequence[float]) -> dict[str, Any]:
-    """Our label of an annotation's `keypoints`, of these names."""
+    """viewsphere's label for an annotation's `keypoints` with these names."""
     rows = np.array(flat, float).reshape(-1, 3)
     places = np.where(rows[:, 2:] > 0, rows[:, :2] + 0.5, math.nan)
     states = np.array([STATES.get(int(flag), NOT_LABELLED) for flag in rows[:, 2]], np.int64)

@@ -35,10 +35,10 @@ OPENED: tuple[Where, ...] = ((), ("categories",), ("models",), ("images",), ("an
 
 
 MOST_FRAMES = 2000
-"""Frames of a split that are looked at, spread evenly: COCOeval keeps all of them in memory."""
+"""Number of frames of a split to check, spread evenly: COCOeval keeps all of them in memory."""
 
 SIGMA = 0.05
-"""Of all points, in COCOeval's similarity of keypoints; found where they are, they are alike whatever it is."""
+"""Sigma of all points in COCOeval's keypoint similarity; at exact positions the similarity is 1 for any value."""
 
 MISTAKES = (LookupError, TypeError, ValueError, AttributeError, AssertionError, OSError)
 """The exceptions that pycocotools raises for invalid files."""
@@ -46,7 +46,7 @@ MISTAKES = (LookupError, TypeError, ValueError, AttributeError, AssertionError, 
 
 @dataclass(frozen=True)
 class _Truth:
-    """An object that is seen: what the stored instance map says of it."""
+    """A visible object, from the stored instance map."""
 
     frame: int
     category: int
@@ -58,10 +58,10 @@ class _Truth:
 def compare_with_pycocotools(
     dataset: Dataset, file: Path, split: str, sampled: Collection[int], options: Options
 ) -> Iterator[Remark]:
-    """Masks, areas and boxes that differ from those of the instance maps, and an AP below 1 of detections made from these, and
-    from the stored keypoints.
+    """Yield masks, areas and boxes that differ from the instance maps, and any AP below 1 for detections made from the maps
+    and from the stored keypoints.
 
-    Imported frames are left out: nobody knows their true masks.
+    Imported frames are left out, because their true masks are unknown.
     """
     positions = sorted(sampled)
     samples = (dataset[i] for i in positions[:: max(1, -(-len(positions) // MOST_FRAMES))])
@@ -87,7 +87,7 @@ def compare_with_pycocotools(
 
 
 def _truths(sample: Sample, ids: Mapping[int, int], names: Names) -> Iterator[tuple[int, _Truth]]:
-    """By the objects' ids; from the run lengths where there is no map to read."""
+    """The visible objects by their ids, taken from the run lengths if there is no map."""
     try:
         instances = sample.channels["instances"]
     except (KeyError, ViewsphereError):
@@ -101,7 +101,7 @@ def _truths(sample: Sample, ids: Mapping[int, int], names: Names) -> Iterator[tu
 
 
 def _loaded(file: Path, images: Collection[int]) -> Any:
-    """The exported file as pycocotools reads it, with these images alone."""
+    """The exported file as pycocotools reads it, with only these images."""
     from pycocotools.coco import COCO
 
     value: dict[str, Any] = {"images": [], "annotations": []}
@@ -143,7 +143,7 @@ def _precision(coco: Any, truths: Collection[_Truth], file: Path) -> Iterator[Re
 
 
 def _precision_of_points(coco: Any, truths: Collection[_Truth], file: Path) -> Iterator[Remark]:
-    """The same of keypoints, category by category, as each has its own number of them."""
+    """Average precision of keypoints by category, because each category has its own number of them."""
     from pycocotools.cocoeval import COCOeval
 
     for category in sorted({truth.category for truth in truths}):
@@ -181,7 +181,7 @@ def verify(dataset: Dataset, folder: Path, sampled: Collection[int], options: Op
 
 
 def _expected(dataset: Dataset, append: Callable[[Entry], None], options: Options) -> Iterator[Expected]:
-    """Yield every file but the instances; for the instances, `append` receives each frame."""
+    """Yield every file except the instances; for the instances, `append` receives each frame."""
     entries = Entries(dataset, options)
     for sample in dataset:
         masks = seen(sample)
@@ -195,7 +195,7 @@ def _nowhere(entry: Entry) -> None:
 
 
 def _frame(where: Where, value: Any) -> int | None:
-    """Ids of images are frames, counted from 1."""
+    """The frame of an image id: ids are frames counted from 1."""
     key = {"images": "id", "annotations": "image_id"}.get(where[0] if where else "")
     number = value.get(key) if key and isinstance(value, dict) else None
     return number - 1 if isinstance(number, int) else None

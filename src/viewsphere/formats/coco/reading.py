@@ -1,4 +1,4 @@
-"""A COCO data set made elsewhere: instances files and their images (https://cocodataset.org/#format-data)."""
+"""A COCO data set from another source: instances files and their images (https://cocodataset.org/#format-data)."""
 
 from __future__ import annotations
 
@@ -28,19 +28,19 @@ from viewsphere.store.texts import parsed
 from viewsphere.urls.inside import is_inside
 
 KINDS = ("instances_", "person_keypoints_")
-"""The beginnings of names of annotation files, before the split; the first that a folder has counts."""
+"""Possible starts of annotation file names, before the split; the first one present in a folder is used."""
 
 BARE = "image_info_"
-"""The beginning of names of files of pictures without annotations."""
+"""The start of file names for pictures without annotations."""
 
 NAMELESS = ("labels", "annotations", "_annotations.coco", "coco_annotations")
-"""Files of one split, whose name is its folder's: FiftyOne's, supervision's, Roboflow's and BlenderProc's."""
+"""File names of FiftyOne, supervision, Roboflow and BlenderProc, one for each split and named by its folder."""
 
 ONLY = "train"
-"""The split of one that lies in no folder of several."""
+"""The split of such a file outside a folder of splits."""
 
 FOLDERS = ("", "data", "images")
-"""The folders of the pictures of such a file, beside it."""
+"""The possible picture folders beside such a file."""
 
 
 LARGEST_ID = 2**63
@@ -58,10 +58,10 @@ HEAD = ("info", "licenses", "categories")
 def read(path: Path, *, keep_going: bool = False) -> ForeignDataset:
     """Return every image and annotation of a folder with instances files, or of one such file.
 
-    Every file becomes a split, named like the file without `instances_`, or like its folder. Its images are searched in the
-    folders that COCO and its relatives use (see `_annotation_files`). Ids of categories are kept. Raises StoreError
-    with every mistake: dangling and repeated ids, missing images, invalid boxes and segmentations. With `keep_going` broken
-    entries are left out and reported.
+    Every file becomes a split, named like the file without `instances_`, or like its folder. Its images are looked up in the
+    folders that COCO and related data sets use (see `_annotation_files`). Ids of categories are kept. Raises StoreError with
+    every mistake: dangling and repeated ids, missing images, invalid boxes and segmentations. With `keep_going` broken entries
+    are left out and reported.
     """
     files = _annotation_files(path)
     root = path if path.is_dir() else path.parent
@@ -103,7 +103,7 @@ def _digest(files: Sequence[tuple[str, Path]], left_out: Sequence[str]) -> str:
 
 @dataclass(frozen=True)
 class _Split:
-    """One instances file: its valid entries, and the problems of the others. `head`: what it says of itself."""
+    """One instances file: its valid entries, and the problems of the others. `head`: the file's metadata."""
 
     split: str
     file: Path
@@ -220,7 +220,7 @@ def _annotation_problem(
 
 
 def _points(head: dict[str, Any]) -> dict[int, tuple[str, ...]]:
-    """Names of the points of each category that has any."""
+    """Names of the points of each category with points."""
     named = said([("", head)]).get("categories", {})
     categories = (c for c in head.get("categories", ()) if isinstance(c, dict) and _is_id(c.get("id")))
     points = {c["id"]: named.get(str(c.get("name")), {}).get(KEYPOINTS) for c in categories}
@@ -242,8 +242,8 @@ def _are_numbers(value: Any, count: int | None) -> bool:
 
 
 def _rle(outline: Any, size: tuple[int, int]) -> str | None:
-    """The run-length code of polygons or run lengths, as pycocotools draws them; None without an outline. No pixel is drawn: a
-    few characters may stand for the largest picture.
+    """The run-length code of polygons or run lengths, as pycocotools draws them; None without an outline. No pixel is drawn,
+    because a few characters may encode a huge picture.
 
     Raises ValueError for outlines on which pycocotools, which does not check its input, could crash.
     """
@@ -267,7 +267,7 @@ def _rle(outline: Any, size: tuple[int, int]) -> str | None:
 
 
 def _clashes(parts: Sequence[_Split]) -> Iterator[str]:
-    """Problems: categories of one id that differ from file to file."""
+    """Problems: categories with the same id that differ between files."""
     first: dict[int, tuple[Category, Path]] = {}
     for part in parts:
         for category in part.categories.values():
@@ -321,7 +321,7 @@ def _corners(source: dict[str, Any]) -> Box | None:
 
 
 def _annotation_files(path: Path) -> list[tuple[str, Path]]:
-    """The files of a folder, or this one file, each with its split; raises StoreError where there are none."""
+    """The files of a folder, or this one file, each with its split. Raises StoreError if there are none."""
     if path.is_file():
         return [(_split_of(path), path)]
     for folder in (path / "annotations", path):
@@ -336,8 +336,8 @@ def _annotation_files(path: Path) -> list[tuple[str, Path]]:
 
 
 def _picture_file(image: dict[str, Any], root: Path, split: str, beside: Path) -> Path | None:
-    """The file of a picture: below the root, where COCO and its relatives keep it, or below the folder `beside`, where the
-    annotations are; None if there is none. Raises StoreError for a path that leads outside.
+    """The file of a picture: below the root, where COCO and related data sets keep it, or below `beside`, the folder of the
+    annotations; None if there is none. Raises StoreError for a path that leads outside.
     """
     name = image.get("file_name")
     if not isinstance(name, str) or not name or not is_inside(name):
@@ -360,7 +360,7 @@ def _split_of(file: Path) -> str:
 
 
 def _bare(root: Path, folder: Path, splits: Sequence[str]) -> list[tuple[str, Path]]:
-    """Splits in which nothing is annotated, and of which there are pictures, as datumaro writes them."""
+    """Splits with pictures but without annotations, as datumaro writes them."""
     found = [(_stem(file), file) for file in sorted(folder.glob(f"{BARE}*.json"))]
     return [
         (split, file)

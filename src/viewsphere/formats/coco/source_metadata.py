@@ -1,4 +1,4 @@
-"""Metadata of an imported COCO data set: info, licences, and the fields that its categories have beside their names, such as
+"""Metadata of an imported COCO data set: info, licences, and its categories' fields besides their names, such as
 `keypoints` and `skeleton`. The plan keeps them, and an export writes them again.
 """
 
@@ -16,12 +16,12 @@ OWN = {"id", "name", "supercategory"}
 """Keys of categories that the plan has in other places."""
 
 Said = Mapping[str, Any]
-"""`info`: of each split; `licenses`: a list; `categories`: of each name, its other keys."""
+"""`info`: by split; `licenses`: a list; `categories`: the other keys by name."""
 
 
 def said(splits: Iterable[tuple[str, Mapping[str, Any]]]) -> dict[str, Any]:
-    """Return the metadata of COCO's files, each given with its split's name, for the plan. Where two files define one name, the
-    first counts. Raises ValueError for numbers that JSON does not have.
+    """Return the metadata of COCO's files, each given with its split's name, for the plan. If two files define the same name,
+    the first wins. Raises ValueError for numbers that JSON does not have.
     """
     info: dict[str, Any] = {}
     licences: dict[str, Any] = {}
@@ -40,7 +40,7 @@ def said(splits: Iterable[tuple[str, Mapping[str, Any]]]) -> dict[str, Any]:
 
 
 def licensed(image: dict[str, Any], licences: Mapping[int, Mapping[str, Any]]) -> dict[str, Any]:
-    """An image's entry with its licence itself in place of the id, which other data sets may have given to others."""
+    """An image's entry with the licence itself in place of its id, which other data sets may use for another licence."""
     known = licences.get(image["license"]) if isinstance(image.get("license"), int) else None
     return image if known is None else {**image, "license": known}
 
@@ -51,7 +51,7 @@ def licences_by_id(data: Mapping[str, Any]) -> dict[int, Mapping[str, Any]]:
 
 
 class Licences:
-    """The licences of an export: those that imported data sets listed, with their own ids where these are free."""
+    """The licences of an export, starting with the licences of imported data sets. They keep their ids if these are free."""
 
     def __init__(self, dataset: Dataset) -> None:
         self._ids: dict[str, int] = {}
@@ -61,7 +61,7 @@ class Licences:
                 self.add(one)
 
     def add(self, licence: Mapping[str, Any]) -> int:
-        """The id of a licence, which is listed if it was not: its own, or the next one where another has it."""
+        """The id of a licence: its own, or the next free one if another licence has it. Lists the licence if it is new."""
         key = _key(licence)
         if key not in self._ids:
             own, taken = licence.get("id"), {one["id"] for one in self.listed}
@@ -76,7 +76,7 @@ class Licences:
 
 
 def imported_info(dataset: Dataset, split: str) -> dict[str, Any] | None:
-    """Return the `info` of a split's imported file, where the whole data set comes from there; else None."""
+    """Return the `info` of a split's imported file if the whole data set was imported from it; else None."""
     told = [one["info"][split] for one in _told(dataset) if split in one.get("info", {})]
     return told[0] if len(told) == 1 and sum(part.frames > 0 for part in dataset.plan.parts) == 1 else None
 
@@ -88,7 +88,7 @@ def imported_info_of_parts(dataset: Dataset) -> list[dict[str, Any]]:
 
 
 def imported_categories(dataset: Dataset) -> dict[str, dict[str, Any]]:
-    """Return the fields that imported categories have beside their names, by the names in lower case, as `merge` joins them."""
+    """Return the fields of imported categories besides their names, by the names in lower case, as `merge` joins them."""
     found: dict[str, dict[str, Any]] = {}
     for one in _told(dataset):
         for name, more in one.get("categories", {}).items():
@@ -98,7 +98,7 @@ def imported_categories(dataset: Dataset) -> dict[str, dict[str, Any]]:
 
 
 def _joined(first: Mapping[str, Any], more: Mapping[str, Any]) -> dict[str, Any]:
-    """A category of two data sets: the first's points, then the other's, with the lines of both."""
+    """A category of two data sets: the points of the first, then those of the second, with the lines of both."""
     names = list(dict.fromkeys((*first.get("keypoints", ()), *more.get("keypoints", ()))))
     numbers = {at: names.index(name) + 1 for at, name in enumerate(more.get("keypoints", ()), 1)}
     lines = [[numbers[one] for one in line] for line in more.get("skeleton", ()) if all(one in numbers for one in line)]
@@ -114,7 +114,7 @@ def _told(dataset: Dataset) -> Iterator[Said]:
 
 
 def _is_sound(key: str, value: Any) -> bool:
-    """Return whether a category's names of points, each once, and its lines are such; of other keys nothing is known."""
+    """Return whether a category's point names (unique) and lines are valid. Other keys are not checked."""
     if key not in ("keypoints", "skeleton"):
         return True
     values = cast(list[Any], value if isinstance(value, list) else [None])

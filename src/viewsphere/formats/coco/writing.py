@@ -44,10 +44,10 @@ if TYPE_CHECKING:
 
 FOLDER_SIZE = 10_000
 CAPTIONS = "captions"
-"""The label whose sentences are exported where a data set has it."""
+"""The label whose sentences are exported if a data set has it."""
 
 Masks = Mapping[int, NDArray[np.bool_]]
-"""Masks (H, W) of the visible pixels of a sample's visible objects but imported ones, by the objects' ids."""
+"""Masks (H, W) of the visible pixels of a sample's visible objects, except imported ones, by the objects' ids."""
 
 
 CHANNELS = ("rgb",)
@@ -87,18 +87,18 @@ def file_name(split: str, kind: str = "instances") -> str:
 
 
 def file_names(dataset: Dataset) -> list[str]:
-    """The names of all files: captions where some of the data set's pictures have them."""
+    """The names of all files, with captions if some of the data set's pictures have them."""
     return [file_name(split, kind) for split in dataset.splits for kind in ("instances", *_caption_files(dataset))]
 
 
 def _caption_files(dataset: Dataset) -> tuple[str, ...]:
-    """The kind of the files of captions, none where no picture has any."""
+    """The kinds of caption files; none if no picture has captions."""
     return (CAPTIONS,) if has_label(dataset, CAPTIONS) else ()
 
 
 @contextmanager
 def instances(dataset: Dataset, folder: Path, options: Options) -> Generator[Callable[[Entry], None]]:
-    """Write the files of all splits into this folder: gives a function that appends a frame to its split's file."""
+    """Write the files of all splits into this folder. Yields a function that appends a frame to its split's file."""
     folder.mkdir(exist_ok=True)
     ids = category_ids(dataset, options)
     head = _head(dataset, ids)
@@ -158,7 +158,7 @@ def _head(dataset: Dataset, ids: Mapping[int, int]) -> dict[str, Any]:
 
 
 def _terms(dataset: Dataset) -> tuple[list[dict[str, Any]], list[dict[str, Any]]]:
-    """The list of licences, imported ones first; and whose the models are, each with its licence's id."""
+    """The list of licences, imported ones first, and the credits of the models, each with its licence's id."""
     groups = {credit: keys for credit, keys in credited(dataset.models).items() if credit}
     licences, credits = Licences(dataset), list[dict[str, Any]]()
     for credit, keys in groups.items():
@@ -179,7 +179,7 @@ class Entry:
 
 
 class Entries:
-    """Makes the entries of samples."""
+    """The maker of samples' entries."""
 
     def __init__(self, dataset: Dataset, options: Options) -> None:
         self._dataset, self._options = dataset, options
@@ -194,7 +194,7 @@ class Entries:
         return Entry(sample.split, json_bytes(image), annotations, captions)
 
     def _annotations(self, sample: Sample, masks: Masks) -> Iterator[dict[str, Any]]:
-        """COCO's annotations of all visible objects, and of imported ones that have a box."""
+        """COCO's annotations of all visible objects, and of imported objects with a box."""
         for o in sample.objects:
             own = {
                 "id": self._dataset.plan.annotation_id(sample.index, o.id),
@@ -213,7 +213,7 @@ def _caption_records(sample: Sample) -> Iterator[dict[str, Any]]:
     """COCO's captions of a picture, if it has any."""
     if CAPTIONS not in sample.requested:
         return
-    from viewsphere.labels.captions import MOST  # which loads what describes scenes
+    from viewsphere.labels.captions import MOST  # which loads the code that describes scenes
 
     for number, caption in enumerate(sample.captions, 1):
         yield {"id": sample.index * MOST + number, "image_id": sample.index + 1, "caption": caption.text}
@@ -259,7 +259,7 @@ def _stem(dataset: Dataset, sample: Sample) -> str:
 
 
 def _image(dataset: Dataset, sample: Sample) -> dict[str, Any]:
-    """COCO's image entry of a sample, with the paper's keys; of an imported one its own entry with new id and file name."""
+    """COCO's image entry of a sample, with the paper's keys; an imported sample keeps its entry with a new id and file name."""
     if sample.known_camera is None or sample.known_pose is None:
         source = dict(sample.source or {})
         named = {"imported_file_name": source["file_name"]} if "file_name" in source else {}
@@ -288,8 +288,8 @@ def _image(dataset: Dataset, sample: Sample) -> dict[str, Any]:
 
 
 def _foreign_annotation(o: ObjectAnnotation, own: Mapping[str, int], names: Names) -> dict[str, Any]:
-    """An imported object's own annotation with this export's ids; its mask file, which is not in the store, is not named. Its
-    points come in the category's order where that has others than when it was imported.
+    """An imported object's annotation with this export's ids, without its mask file, which is not in the store. Its points
+    follow the category's order if the category's points have changed since the import.
     """
     source = {k: v for k, v in (o.source or {}).items() if k != "path_mask"}
     told = o.extra.get("keypoint_names")
@@ -298,7 +298,7 @@ def _foreign_annotation(o: ObjectAnnotation, own: Mapping[str, int], names: Name
 
 
 def _annotation(sample: Sample, o: ObjectAnnotation, outline: Any, mask_file: str) -> dict[str, Any]:
-    """The fields of a rendered object's annotation, but for its ids."""
+    """The fields of a rendered object's annotation, except its ids."""
     return {
         "iscrowd": 0,
         "area": o.area,

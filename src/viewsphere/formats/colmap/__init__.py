@@ -48,7 +48,7 @@ from viewsphere.plugins.format import FormatSpec
 from viewsphere.store import Dataset
 
 SHARED = 1
-"""The rig that all frames have whose lenses are those of the first."""
+"""The number of the rig shared by all frames with the first frame's lenses."""
 
 
 class Options(Frozen):
@@ -58,7 +58,7 @@ class Options(Frozen):
 
 
 def refuses(scope: Scope, options: Options) -> Iterator[str]:
-    """Cameras that nobody knows, skew, lenses that OpenCV does not have, and splits that are called like a model's files."""
+    """Reasons to refuse: unknown cameras, skew, lenses that OpenCV lacks, and splits named like a model's files."""
     yield from known_cameras(scope)
     yield from no_skew(scope)
     yield from opencv_lenses(scope)
@@ -75,7 +75,7 @@ class Colmap(Tree):
         self._rigs, self._sights = Rigs(dataset), Sights(dataset)
 
     def of(self, sample: Sample) -> Iterator[File | Piece]:
-        """A picture, its image, its points, and, of the first of an instant, the frame."""
+        """A picture, its image record and points and, with the first picture of an instant, the frame."""
         now, world, own = self._rigs.at(sample), world_of(self.dataset, sample), sample.index + 1
         part = self.dataset.plan.part_of(sample.index)
         name = self.stem(sample).partition("/")[2] + suffix_of(sample, ".png", ".jpg")
@@ -121,7 +121,7 @@ class Colmap(Tree):
         return [_rig(SHARED, numbers, [np.array(sensor.rig_from_sensor) for sensor in rig.sensors])]
 
     def _numbers(self, now: Moment, part: int) -> tuple[list[int], int]:
-        """Numbers of a moment's cameras and rig: the shared ones, where they are as these."""
+        """Numbers of a moment's cameras and rig: the shared numbers if the cameras and rig are equal."""
         usual = self._rigs.usual(part)
         sensors = () if usual is None else usual.sensors
         if now.lenses == tuple(sensor.intrinsics for sensor in sensors) and all(
@@ -131,7 +131,7 @@ class Colmap(Tree):
         return [len(sensors) + now.first + number + 1 for number in range(len(now.lenses))], now.first + 1 + SHARED
 
     def _piece(self, folder: str, file: str, records: Iterable[Record], part: int | str = "") -> Piece:
-        """Records of one of the five files, which is there even if there are none."""
+        """Records of one of the five files, which exists even without records."""
         own = list(records)
         return Piece(f"{folder}/{file}{'.bin' if self._binary else '.txt'}", self._bytes(own), str(part), count=len(own))
 
@@ -140,7 +140,7 @@ class Colmap(Tree):
 
 
 def _rig(number: int, cameras: Iterable[int], mounts: Iterable[np.ndarray[Any, Any]]) -> Rig:
-    """A rig of sensors that are mounted so: `rig_from_sensor`, (4, 4)."""
+    """A rig of sensors with these mounts, `rig_from_sensor`, (4, 4)."""
     turned = [(mount[:3, :3].T, mount[:3, 3]) for mount in mounts]
     return Rig(number, list(cameras), [pose_of(R, -transform(R, place)) for R, place in turned])
 

@@ -1,4 +1,4 @@
-"""COLMAP's cameras, and its mesh where there is one, to be rendered again."""
+"""COLMAP's cameras and its mesh, if any, for rendering again."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ def again(path: Path) -> SourceCameras:
     """Return every camera of a folder with `sparse/0`, or of such a `sparse/0`, text or binary, in the order of their images'
     names.
 
-    Pictures are not required. Up is the axis of the world that is nearest to the cameras' mean up. Raises StoreError where
-    there is no model, for an image without its camera, and for a lens that viewsphere does not have.
+    Pictures are not required. Up is the axis of the world that is nearest to the cameras' mean up. Raises StoreError if there
+    is no model, for an image without its camera, and for a lens that viewsphere does not support.
     """
     model = read_model(path)
     problems: list[str] = []

@@ -17,15 +17,15 @@ from viewsphere.model.sample import Sample
 from viewsphere.store import Dataset
 
 MOST = 10_000_000
-"""More points than an image has: a point's number is that of the image that it was picked in, times this, and its place."""
+"""Factor of the image's number in a point's number, to which the point's place is added; larger than any image's points."""
 
 STILL = 1e-6
-"""Metres by which a point may move that counts as standing still."""
+"""Greatest motion of a point that counts as static, metres."""
 
 
 @dataclass(frozen=True, eq=False)
 class Shown:
-    """Points that an image shows, (N,) of `SEEN`, and those that the model has because of it."""
+    """Points that an image shows, (N,) of `SEEN`, and the points that it adds to the model."""
 
     seen: NDArray[np.void]
     points: tuple[Point, ...]
@@ -39,7 +39,7 @@ class Sights:
         self._followed = lru_cache(maxsize=4)(self._follow)
 
     def of(self, sample: Sample) -> Shown:
-        """Points that are followed through the sample's sequence, or those of a coarse grid, which only this image has."""
+        """Points followed through the sample's sequence, or points of a coarse grid that only this image has."""
         if sample.sequence and "tracks" in sample.channels:
             return self._of_tracks(sample, self._followed(sample.sequence, sample.sensor))
         found, own = points_of(sample), sample.index + 1
@@ -55,7 +55,7 @@ class Sights:
         return Shown(seen, tuple(self._picked(sample, rows, followed)))
 
     def _picked(self, sample: Sample, rows: NDArray[np.void], followed: _Followed) -> Iterator[Point]:
-        """The points that were picked in this image."""
+        """The points picked in this image."""
         places = np.cumsum(followed.holds, axis=1) - 1
         for k in np.flatnonzero((rows["instant"] == sample.instant) & followed.holds.any(axis=0)).tolist():
             column, row = np.floor(rows["query"][k]).astype(int)
@@ -65,7 +65,7 @@ class Sights:
             yield Point(int(followed.numbers[k]), place, sample.picture[at][:3].tolist(), track)
 
     def _follow(self, sequence: str, sensor: str) -> _Followed:
-        """Read twice, so that no more than one sample's rows are kept."""
+        """The followed points of a sensor. Samples are read twice, so that only one sample's rows are in memory."""
         samples = self._dataset.sequence(sequence, sensor)
         places, numbers = np.zeros(0), np.zeros(0, np.int64)
         for sample in samples:
@@ -85,8 +85,8 @@ class Sights:
 
 @dataclass(frozen=True, eq=False)
 class _Followed:
-    """Points that a sensor follows: the images of its sequence, the points' numbers (N,), and which image, (T, N), shows which
-    of them where it was picked.
+    """Points that a sensor follows: the images of its sequence, the points' numbers (N,), and (T, N) whether each image shows
+    each point where it was picked.
     """
 
     images: list[int]

@@ -39,7 +39,7 @@ PARAMETERS = {
     "SIMPLE_RADIAL_FISHEYE": (8, "f cx cy k1"),
     "RADIAL_FISHEYE": (9, "f cx cy k1 k2"),
 }
-"""Number and parameters of the models that have an exact counterpart here."""
+"""Number and parameters of the lens models with an exact counterpart in viewsphere."""
 
 NAMES = {number: name for name, (number, _) in PARAMETERS.items()}
 OWN = {"cameras", "images", "points3D", "rigs", "frames"}
@@ -58,8 +58,9 @@ def read(path: Path, *, keep_going: bool = False) -> ForeignDataset:
     """Return every image of a folder with `sparse/0` and `images`, or of such a `sparse/0`, in the order of their names, with
     cameras. There are no objects and no points.
 
-    Splits are the lists in `<split>.txt` beside the model; without these all is `train`. The world's axes are COLMAP's. Raises
-    StoreError with every image that lacks its picture or its camera; with `keep_going` these are left out and reported.
+    Splits are the lists in `<split>.txt` beside the model; without lists, all images are `train`. The world's axes are
+    COLMAP's. Raises StoreError with every image that lacks its picture or its camera; with `keep_going` these are left out and
+    reported.
     """
     model = read_model(path)
     folder = model.cameras.parent
@@ -80,7 +81,7 @@ def read(path: Path, *, keep_going: bool = False) -> ForeignDataset:
 
 @dataclass(frozen=True)
 class Model:
-    """A sparse model: its files of cameras and images, lenses by their numbers, images by their names, splits of some."""
+    """A sparse model: its files of cameras and images, lenses by number, images by name, and the splits of listed images."""
 
     cameras: Path
     file: Path
@@ -89,7 +90,7 @@ class Model:
     splits: dict[str, str]
 
     def view(self, image: _Image) -> tuple[Intrinsics, NDArray[np.float64], str]:
-        """An image's lens, its pose, world_from_camera (3, 4), and its split; raises ValueError where it lacks one."""
+        """An image's lens, its pose, world_from_camera (3, 4), and its split; raises ValueError if either is missing."""
         split = self.splits.get(image.name, "train")
         if image.camera not in self.lenses:
             raise ValueError(f"found no camera {image.camera}")
@@ -102,7 +103,7 @@ class Model:
 
 
 def read_model(path: Path) -> Model:
-    """The sparse model in a folder, its images in the order of their names; raises StoreError where there is none."""
+    """The sparse model in a folder, its images in the order of their names. Raises StoreError if there is no model."""
     files = next(filter(None, map(_files, (path / "sparse" / "0", path / "sparse", path))), None)
     if files is None:
         raise without_world(path, "sparse/0 with cameras and images as .txt or .bin", "sparse/0/cameras.*", "cameras.*")
@@ -122,7 +123,7 @@ def read_model(path: Path) -> Model:
 
 
 def _files(folder: Path) -> tuple[Path, Path] | None:
-    """A model's files of cameras and images, binary ones first; None where there are none."""
+    """A model's files of cameras and images, preferably binary; None if there are none."""
     for ending in (".bin", ".txt"):
         cameras, images = folder / f"cameras{ending}", folder / f"images{ending}"
         if cameras.is_file() and images.is_file():
@@ -147,7 +148,7 @@ def _lens(model: str, size: tuple[int, int], values: Sequence[float]) -> Intrins
 
 
 def _lines(file: Path) -> list[str]:
-    """Lines that are no comments."""
+    """Lines other than comments."""
     try:
         text = read_text(file, "MAX_RECORD_BYTES")
     except (OSError, ValueError) as error:
@@ -166,7 +167,7 @@ def _text_cameras(file: Path) -> Iterator[tuple[int, str, tuple[int, int], list[
 
 
 def _text_images(file: Path) -> Iterator[_Image]:
-    """Every image has two lines, of which the second, its points, may be empty."""
+    """The images of a text file. Each has two lines; the second one, its points, may be empty."""
     lines = iter(_lines(file))
     for line in filter(None, lines):
         words = line.split(maxsplit=9)

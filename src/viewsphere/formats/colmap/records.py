@@ -1,4 +1,4 @@
-"""Records of COLMAP's text and binary files; lists that a text file ends by its lines have their lengths in binary ones."""
+"""Records of COLMAP's text and binary files. Lists end with their line in text files; binary files store their lengths."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ Pose = tuple[float, ...]
 
 MODELS = {"PINHOLE": 1, "OPENCV": 4, "OPENCV_FISHEYE": 5, "FULL_OPENCV": 6}
 CAMERA = 0
-"""The number of the type of sensors that are cameras."""
+"""The number of the sensor type camera."""
 
 
 def pose_of(R: Float, t: Float) -> Pose:
@@ -29,7 +29,7 @@ def pose_of(R: Float, t: Float) -> Pose:
 
 
 def lens_of(lens: Intrinsics) -> tuple[str, list[float]]:
-    """The name of a lens' model, and its parameters. Raises UserError for one that has no model."""
+    """The name of a lens' model, and its parameters. Raises UserError for a lens without a model."""
     opencv = lens.lens.opencv
     if lens.skew or opencv is None:
         found = f"{lens.skew:g}" if lens.skew else lens.lens.name
@@ -52,12 +52,12 @@ class Camera:
     lens: Intrinsics
 
     def text(self) -> str:
-        """Its line, or lines, in a text file."""
+        """The record's line or lines in a text file."""
         model, values = lens_of(self.lens)
         return _line(self.number, model, self.lens.width, self.lens.height, *values)
 
     def binary(self) -> bytes:
-        """Its bytes in a binary file."""
+        """The record's bytes in a binary file."""
         model, values = lens_of(self.lens)
         head = struct.pack("<IiQQ", self.number, MODELS[model], self.lens.width, self.lens.height)
         return head + struct.pack(f"<{len(values)}d", *values)
@@ -73,12 +73,12 @@ class Rig:
     poses: Sequence[Pose]
 
     def text(self) -> str:
-        """Its line, or lines, in a text file."""
+        """The record's line or lines in a text file."""
         others = [value for camera, pose in self._others() for value in ("CAMERA", camera, 1, *pose)]
         return _line(self.number, len(self.cameras), "CAMERA", self.cameras[0], *others)
 
     def binary(self) -> bytes:
-        """Its bytes in a binary file."""
+        """The record's bytes in a binary file."""
         head = struct.pack("<IIiI", self.number, len(self.cameras), CAMERA, self.cameras[0])
         return head + b"".join(struct.pack("<iIB7d", CAMERA, camera, 1, *pose) for camera, pose in self._others())
 
@@ -88,7 +88,7 @@ class Rig:
 
 @dataclass(frozen=True)
 class Frame:
-    """A rig's pose, rig_from_world, and the images that it takes then, as (camera, image)."""
+    """A rig's pose, rig_from_world, and its images at that instant, as (camera, image)."""
 
     COLUMNS: ClassVar[str] = "FRAME_ID, RIG_ID, QW, QX, QY, QZ, TX, TY, TZ, NUM_DATA, then TYPE, SENSOR_ID, DATA_ID"
     number: int
@@ -97,12 +97,12 @@ class Frame:
     images: Sequence[tuple[int, int]]
 
     def text(self) -> str:
-        """Its line, or lines, in a text file."""
+        """The record's line or lines in a text file."""
         data = [value for camera, image in self.images for value in ("CAMERA", camera, image)]
         return _line(self.number, self.rig, *self.pose, len(self.images), *data)
 
     def binary(self) -> bytes:
-        """Its bytes in a binary file."""
+        """The record's bytes in a binary file."""
         head = struct.pack("<II7dI", self.number, self.rig, *self.pose, len(self.images))
         return head + b"".join(struct.pack("<iIQ", CAMERA, camera, image) for camera, image in self.images)
 
@@ -113,7 +113,7 @@ SEEN = np.dtype([("x", "<f8"), ("y", "<f8"), ("point", "<u8")])
 
 @dataclass(frozen=True, eq=False)
 class Image:
-    """A picture's file, pose, cam_from_world, camera, and the points that it shows, (N,) of `SEEN`."""
+    """A picture's file, pose (cam_from_world), camera, and visible points, (N,) of `SEEN`."""
 
     COLUMNS: ClassVar[str] = "IMAGE_ID, QW, QX, QY, QZ, TX, TY, TZ, CAMERA_ID, NAME; a line of X, Y, POINT3D_ID"
     number: int
@@ -123,19 +123,19 @@ class Image:
     seen: NDArray[np.void]
 
     def text(self) -> str:
-        """Its line, or lines, in a text file."""
+        """The record's line or lines in a text file."""
         head = _line(self.number, *self.pose, self.camera, self.name)
         return head + _line(*(value for row in self.seen.tolist() for value in row))
 
     def binary(self) -> bytes:
-        """Its bytes in a binary file."""
+        """The record's bytes in a binary file."""
         head = struct.pack("<I7dI", self.number, *self.pose, self.camera)
         return head + self.name.encode() + b"\0" + struct.pack("<Q", len(self.seen)) + self.seen.tobytes()
 
 
 @dataclass(frozen=True)
 class Point:
-    """A point in the world, metres, its colour, and which images show it, as (image, place among its points)."""
+    """A point in the world, metres, its colour, and the images that show it, as (image, place among its points)."""
 
     COLUMNS: ClassVar[str] = "POINT3D_ID, X, Y, Z, R, G, B, ERROR, then IMAGE_ID, POINT2D_IDX"
     number: int
@@ -144,11 +144,11 @@ class Point:
     seen: Sequence[tuple[int, int]]
 
     def text(self) -> str:
-        """Its line, or lines, in a text file."""
+        """The record's line or lines in a text file."""
         return _line(self.number, *self.place, *self.color, 0.0, *(value for pair in self.seen for value in pair))
 
     def binary(self) -> bytes:
-        """Its bytes in a binary file."""
+        """The record's bytes in a binary file."""
         track = b"".join(struct.pack("<II", *pair) for pair in self.seen)
         return struct.pack("<Q3d3BdQ", self.number, *self.place, *self.color, 0.0, len(self.seen)) + track
 

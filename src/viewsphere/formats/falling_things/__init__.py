@@ -61,10 +61,10 @@ from viewsphere.store import Dataset
 
 CHANNELS = ("rgb", "depth", "instances")
 FOLDER = 1000
-"""Numbers of pictures in a folder."""
+"""Number of pictures in a folder."""
 
 SINGLE = 255
-"""The class of all objects, where pictures have one."""
+"""The class number of all objects in pictures of a single object."""
 
 
 class Options(Frozen):
@@ -76,7 +76,7 @@ class Options(Frozen):
 
 
 def refuses(scope: Scope, options: Options) -> Iterator[str]:
-    """Cameras that nobody knows, lenses that are no pinholes, and rigs that are neither a camera nor a pair."""
+    """Reasons to refuse: unknown cameras, lenses other than pinholes, and rigs other than a camera or a pair."""
     yield from known_cameras(scope)
     yield from pinhole(scope)
     if scope.rig is not None and _sides(scope.rig) is None:

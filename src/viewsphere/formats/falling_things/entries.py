@@ -19,7 +19,7 @@ CUBOID = ((-1, -1, 1), (1, -1, 1), (1, -1, -1), (-1, -1, -1), (-1, 1, 1), (1, 1,
 """The sides of a box's corners in FAT's order."""
 
 OBJECT_FROM_FAT = np.array([[-1.0, 0, 0], [0, 0, -1], [0, -1, 0]])
-"""FAT's x is the object's right, our -x; its y is down, our -z; its z is ahead, our -y."""
+"""FAT's x is the object's right, viewsphere's -x; its y is down, viewsphere's -z; its z is ahead, viewsphere's -y."""
 
 PERMUTED = np.array([[0.0, 0, 1, 0], [1, 0, 0, 0], [0, -1, 0, 0], [0, 0, 0, 1]])
 
@@ -45,12 +45,12 @@ def _xyzw(rotation: NDArray[np.float64]) -> list[float]:
 
 
 def box_of(o: ObjectAnnotation) -> tuple[float, float, float, float] | None:
-    """The box of the projected model, which may reach out of the picture; None where nothing of it is projected."""
+    """The box of the projected model, which may extend beyond the picture; None if no part of it is projected."""
     return o.box2d_unclipped or o.box2d_projected
 
 
 def annotation(o: ObjectAnnotation, k: NDArray[np.float64], matrix: str) -> dict[str, Any]:
-    """An object that has a box; `k` (3, 3), `matrix` names the permuted pose."""
+    """The record of an object with a box. `k` is (3, 3); `matrix` is the permuted pose's key."""
     center = o.box3d_object.mean(axis=0)
     pose = compose(o.camera_from_object, rigid(OBJECT_FROM_FAT, center))
     pose[:3, 3] *= CM

@@ -26,7 +26,7 @@ from viewsphere.store import Dataset
 
 
 def check() -> None:
-    """Raise MissingExtraError where there is no pyarrow."""
+    """Raise MissingExtraError if pyarrow is missing."""
     arrow()
 
 

@@ -1,4 +1,4 @@
-"""pyarrow, which the extra `huggingface` brings."""
+"""pyarrow, from the extra `huggingface`."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from viewsphere.errors import MissingExtraError
 
 
 def arrow() -> Any:
-    """The package, with `parquet`; raises MissingExtraError where there is none."""
+    """The package, with `parquet`; raises MissingExtraError if it is missing."""
     try:
         import pyarrow.parquet  # pyright: ignore[reportUnusedImport]  # it becomes an attribute
     except ImportError:

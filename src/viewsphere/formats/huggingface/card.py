@@ -14,7 +14,7 @@ CARD = "README.md"
 
 
 def card(dataset: Dataset, shards: Shards) -> str:
-    """The text: which files are which split, what the columns are, and whom to name."""
+    """The text of the card: the files of each split, the columns, and the credits."""
     files = "".join(f"  - split: {s.name}\n    path: data/{s.name}-*.parquet\n" for s in shards.splits.values())
     head = f"---\npretty_name: {json.dumps(dataset.name)}\nconfigs:\n- config_name: default\n  data_files:\n{files}---\n"
     columns = "".join(f"| `{name}` | {_told(feature)} |\n" for name, feature in shards.columns.features.items())

@@ -65,7 +65,7 @@ class Columns:
 
     def _of_objects(self) -> dict[str, Feature]:
         names: dict[str, int] = {}
-        for c in self._dataset.categories:  # imported ones may share a name
+        for c in self._dataset.categories:  # imported categories may share a name
             names.setdefault(c.name if c.name not in names else f"{c.name} ({c.id})", c.id)
         return {
             "id": value("int64"),
@@ -94,7 +94,9 @@ class Columns:
         return row, sum(len(picture["bytes"]) for picture in pictures.values())
 
     def _image(self, sample: Sample, name: str) -> dict[str, Any]:
-        """A picture's file as `datasets` has it inside: the store's own, or the default one where Pillow cannot read that."""
+        """A picture's file as `datasets` embeds it: the stored file, or the default encoding if Pillow cannot read the stored
+        one.
+        """
         suffix = PurePosixPath(sample.files[name]).suffix
         if suffix in READABLE:
             data = self._dataset.read(sample.files[name])
@@ -127,7 +129,7 @@ def _camera(sample: Sample) -> dict[str, Any] | None:
 
 
 def arrow_type(feature: Feature) -> Any:
-    """The Arrow type in which `datasets` keeps a type of its own."""
+    """The Arrow type in which `datasets` stores one of its own types."""
     pa = arrow()
     match feature.get("_type"):
         case "Image":

@@ -1,4 +1,4 @@
-"""The proof of an export: each file beside what would be written now."""
+"""The proof of an export: each file compared with a new export."""
 
 from __future__ import annotations
 
@@ -25,8 +25,8 @@ other bytes.
 
 
 def verify(dataset: Dataset, folder: Path, sampled: Collection[int], options: Options) -> Iterator[Remark]:
-    """Yield every difference from the current export. The proof makes an export of its own, of which one file a split exists at
-    a time.
+    """Yield every difference from the current export. The proof makes a new export, of which only one file for each split
+    exists at a time.
     """
     names = [CARD]
     with TemporaryDirectory() as aside:

@@ -14,12 +14,12 @@ from viewsphere.formats.huggingface.options import Options
 from viewsphere.model.sample import Sample
 
 ROWS, BYTES = 100, 1 << 25
-"""A group of rows, which is what is held in memory, ends with so many rows, or with so many bytes of pictures."""
+"""Limits of a group of rows, the unit held in memory: its number of rows, and its bytes of pictures."""
 
 
 @dataclass
 class _Split:
-    """The files of a split: how many are whole, and what of the next one is there."""
+    """The files of a split: the number of complete files, and the started part of the next one."""
 
     name: str
     whole: int = 0
@@ -41,7 +41,7 @@ class Shards:
         (folder / "data").mkdir()
 
     def add(self, sample: Sample) -> list[str]:
-        """Write a sample; gives the name of the file that is whole now, if one is."""
+        """Write a sample. Returns the name of the file that it completes, if any."""
         split = self.splits.setdefault(sample.split, _Split(split_name(sample.split)))
         row, size = self.columns.row(sample)
         split.rows.append(row)
@@ -52,7 +52,7 @@ class Shards:
         return [self._finish(split)] if split.samples == self._most else []
 
     def end(self) -> list[str]:
-        """Finish the last files; gives their names."""
+        """Finish the last files. Returns their names."""
         return [self._finish(split) for split in self.splits.values() if split.samples]
 
     def _flush(self, split: _Split) -> None:

@@ -60,7 +60,9 @@ from viewsphere.plugins.format import FormatSpec
 
 
 def refuses(scope: Scope, options: Options) -> Iterator[str]:
-    """Lenses, names, other cars than KITTI's, and what is no sequence."""
+    """Reasons to refuse: unsupported lenses and names, rigs unlike KITTI's car and, for tracking, pictures outside
+    sequences.
+    """
     yield from pinhole(scope)
     yield from other_cars(scope)
     yield from plain_names(scope)
@@ -68,7 +70,7 @@ def refuses(scope: Scope, options: Options) -> Iterator[str]:
     for name in (name for name, count in counts.items() if count > 1):
         alike = ", ".join(category.name for category in scope.categories if type_of(category.name) == name)
         yield f"expected categories of different types; found {alike}, all of type {name}"
-    if options.task == "tracking" and scope.rig is not None:  # of others each picture says whether it is of a sequence
+    if options.task == "tracking" and scope.rig is not None:  # imported pictures each record whether they belong to a sequence
         yield from sequences(scope)
 
 

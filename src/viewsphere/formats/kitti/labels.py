@@ -1,4 +1,4 @@
-"""Lines of KITTI's labels, and its calibrations, as others may have written them."""
+"""Lines of KITTI's labels, and its calibrations, from other sources."""
 
 from __future__ import annotations
 
@@ -18,13 +18,15 @@ from viewsphere.model.sample import Box
 from viewsphere.model.sensors.camera import Camera, Intrinsics
 
 LEVEL = np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]])
-"""From a world whose z is up, and whose origin is KITTI's reference camera, which looks along y, to that camera's axes."""
+"""The rotation to the axes of KITTI's reference camera, from a world with z up in which this camera is the origin and looks
+along y.
+"""
 
 FARTHEST = 1e6
-"""Pixels, or metres, beyond which no number of a label is."""
+"""Limit of all numbers of a label, pixels or metres."""
 
 SHORTEST = 1e-3
-"""Pixels, a focal length at least."""
+"""Least focal length, pixels."""
 
 Number = TypeVar("Number", int, float)
 MOST_TRACKS = 10**6
@@ -34,8 +36,8 @@ DONT_CARE_TYPE = "DontCare"
 
 @dataclass(frozen=True)
 class Row:
-    """A line: its track, None in files of pictures; what it says as numbers in `said`; its half-open box; its 3D box as height,
-    width, length, the middle of its bottom and its turn about y (metres, radians), None where it has none.
+    """A line: its track (None in files of pictures); its numbers in `said`; its half-open box; its 3D box as height, width,
+    length, the middle of its bottom and its turn about y (metres, radians), None if it has no 3D box.
     """
 
     kind: str
@@ -46,13 +48,15 @@ class Row:
 
     @property
     def is_region(self) -> bool:
-        """Return whether it is of a region that evaluations leave out."""
+        """Return whether the line is a region that evaluations leave out."""
         return self.kind == DONT_CARE_TYPE
 
 
 @dataclass(frozen=True)
 class Labels:
-    """A file's lines by their frames, all of 0 in the file of a picture; the problems of others, and why it cannot be used."""
+    """A file's lines by frame (frame 0 in the file of a picture), the problems of invalid lines, and the reason why the file
+    is unusable.
+    """
 
     rows: Mapping[int, Sequence[Row]] = field(default_factory=dict[int, Sequence[Row]])
     problems: tuple[str, ...] = ()
@@ -84,7 +88,7 @@ def read_labels(file: Path, is_tracked: bool) -> Labels:
 
 
 def _parsed(words: Sequence[str], is_tracked: bool) -> tuple[int, Row]:
-    """The frame and the row of a line's words; raises ValueError for any that cannot be."""
+    """The frame and the row of a line's words. Raises ValueError for impossible words."""
     begins = 2 if is_tracked else 0
     if len(words) - begins not in (COLUMNS, COLUMNS + 1):
         raise ValueError(f"expected {COLUMNS + begins} values, or one more; found {len(words)}")
@@ -119,7 +123,7 @@ def _number(word: str, kind: Callable[[str], Number]) -> Number:
 
 
 def _solid(values: Sequence[float]) -> tuple[float, ...] | None:
-    """A 3D box; None where all its sides are -1, as where nobody knows it."""
+    """A 3D box; None if all its sides are -1, the value for an unknown box."""
     if all(side <= 0 for side in values[:3]):
         return None
     if not all(side > 0 for side in values[:3]):
@@ -128,7 +132,7 @@ def _solid(values: Sequence[float]) -> tuple[float, ...] | None:
 
 
 def read_camera(file: Path, size: tuple[int, int]) -> Camera:
-    """The left colour camera of a calibration; raises ValueError for a P2 that is none of a pinhole."""
+    """The left colour camera of a calibration; raises ValueError for a P2 that is not a pinhole's."""
     words = next((line.split() for line in text_of(file) if line.startswith(("P2:", "P2 "))), [])
     try:
         found = np.array(words[1:], np.float64)
@@ -146,6 +150,6 @@ def read_camera(file: Path, size: tuple[int, int]) -> Camera:
 
 
 def _is_pinhole(projection: NDArray[np.float64]) -> bool:
-    """Return whether the left three columns are K of a lens that is no point."""
+    """Return whether the left three columns are K of a pinhole with focal lengths of at least `SHORTEST`."""
     k = projection[:, :3]
     return bool(min(k[0, 0], k[1, 1]) >= SHORTEST and k[1, 0] == 0 and (k[2] == (0, 0, 1)).all())

@@ -1,4 +1,4 @@
-"""KITTI's data sets of objects and of tracks made elsewhere: pictures, their labels and calibrations."""
+"""KITTI's data sets of objects and of tracks from other sources: pictures, their labels and calibrations."""
 
 from __future__ import annotations
 
@@ -38,38 +38,38 @@ from viewsphere.urls.inside import is_inside
 
 SUFFIXES = (".png", ".jpg", ".jpeg")
 FILES_KEPT = 4
-"""Files of labels that are kept for the next picture of their sequence."""
+"""Number of label files to keep for the next picture of their sequence."""
 
 Of = Callable[[Path, bool], Labels]
 
 
 @dataclass(frozen=True)
 class _Frame(Listed):
-    """A picture; of a sequence, with its number there."""
+    """A picture and, in a sequence, its number there."""
 
     sequence: str = ""
     instant: int = 0
 
     @property
     def is_tracked(self) -> bool:
-        """Return whether it is of a sequence."""
+        """Return whether the picture belongs to a sequence."""
         return bool(self.sequence)
 
 
 @dataclass(frozen=True)
 class _Place:
-    """A folder, from the root, with labelled pictures of a task."""
+    """A folder, relative to the root, with labelled pictures of a task."""
 
     folder: str
     is_tracked: bool
 
     @property
     def split(self) -> str:
-        """The split of its pictures, where no list gives one."""
+        """The split of its pictures if no list gives one."""
         return TRAIN if self.folder in ("", "training") else self.folder
 
     def at(self, name: str) -> str:
-        """The path of something in the folder, from the root."""
+        """The path of an item in the folder, relative to the root."""
         return f"{self.folder}/{name}" if self.folder else name
 
     @property
@@ -121,7 +121,7 @@ def read(path: Path, *, keep_going: bool = False) -> ForeignDataset:
 
 
 def _places(root: Path) -> Iterator[_Place]:
-    """The folders that have pictures and labels."""
+    """The folders with pictures and labels."""
     for folder in ("", *sorted(one.name for one in root.glob("*") if one.is_dir())):
         for place in (_Place(folder, False), _Place(folder, True)):
             if (root / place.images).is_dir() and (root / place.labels).is_dir():
@@ -129,7 +129,7 @@ def _places(root: Path) -> Iterator[_Place]:
 
 
 def _pictures(root: Path, places: tuple[_Place, ...], labels_of: Of, problems: list[str]) -> Iterator[_Frame]:
-    """The pictures of all lists, each in the first that has it; without lists, those of all folders."""
+    """The pictures of all lists, each in its first list; without lists, the pictures of all folders."""
     camera_of, seen = lru_cache(FILES_KEPT)(read_camera), set[tuple[_Place, str]]()
     frames: dict[tuple[str, int], str] = {}
     for split, source, place, name in _named(root, places, problems):
@@ -146,7 +146,7 @@ def _pictures(root: Path, places: tuple[_Place, ...], labels_of: Of, problems: l
 
 
 def _named(root: Path, places: tuple[_Place, ...], problems: list[str]) -> Iterator[tuple[str, Path, _Place, str]]:
-    """Split, where it is said, place and name of each picture."""
+    """Yield the split, the file or folder that defines it, the place and the name of each picture."""
     own = {place: dict.fromkeys(place.names(root)) for place in places}
     has_lists, is_tested = False, (root / "testing").is_dir() and "testing" not in {place.folder for place in places}
     for split, file, names in lists(root, "ImageSets", problems):
@@ -162,7 +162,7 @@ def _named(root: Path, places: tuple[_Place, ...], problems: list[str]) -> Itera
 def _picture(
     root: Path, place: _Place, split: str, name: str, labels_of: Of, camera_of: Callable[[Path, tuple[int, int]], Camera]
 ) -> _Frame:
-    """A picture of which all that is said can be read."""
+    """A picture with readable labels and calibration."""
     if not is_inside(name):
         raise StoreError("expected a picture below the folder; found a path that leads outside")
     file, size = picture_inside(root, f"{place.images}/{name}", *SUFFIXES)
@@ -183,7 +183,7 @@ def _picture(
 
 
 def _unpictured(root: Path, places: tuple[_Place, ...], labels_of: Of) -> Iterator[str]:
-    """Problems: labels, and frames of them, without pictures."""
+    """Problems: labels, and frames of labels, without pictures."""
     for place in places:
         known: defaultdict[str, set[int]] = defaultdict(set)
         for name in place.names(root):
@@ -199,7 +199,7 @@ def _unpictured(root: Path, places: tuple[_Place, ...], labels_of: Of) -> Iterat
 
 
 def _shown(categories: Mapping[str, Category], labels_of: Of, first: int, picture: _Frame, index: int) -> Sample:
-    """A picture with its objects; tracks are numbered from `first` on more than they say."""
+    """A picture with its objects; `first` is added to the numbers of tracks."""
     labels, calibrated = picture.said
     assert labels is not None
     rows = labels_of(labels, picture.is_tracked).rows.get(picture.instant, ())
@@ -218,7 +218,7 @@ def _shown(categories: Mapping[str, Category], labels_of: Of, first: int, pictur
 
 
 def _object(number: int, row: Row, category: Category, picture: _Frame, camera: Camera | None) -> ObjectAnnotation:
-    """An object with its box and its pose, and as COCO would have it in `source`."""
+    """An object with its box and its pose; its `source` holds its COCO annotation."""
     x0, y0, x1, y1 = row.box
     source = {"bbox": [x0, y0, x1 - x0, y1 - y0], "area": (x1 - x0) * (y1 - y0), **row.said}
     known: dict[str, Any] = {} if row.solid is None else _standing(row.solid, camera)

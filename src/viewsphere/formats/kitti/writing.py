@@ -28,7 +28,7 @@ CALIBRATED = {
     "object": ("R0_rect:", "Tr_velo_to_cam:", "Tr_imu_to_velo:"),
     "tracking": ("R_rect", "Tr_velo_cam", "Tr_imu_velo"),
 }
-"""The beginnings of the calibration lines behind the projections, by task; only `object` has colons."""
+"""The first words of the calibration lines after the projections, by task; only `object` has colons."""
 
 
 class Options(Frozen):
@@ -40,12 +40,12 @@ class Options(Frozen):
 
 
 def type_of(category: str) -> str:
-    """KITTI's name of a category, or its own."""
+    """KITTI's name of a category, or the category's own name."""
     return TYPES.get(category.casefold(), category)
 
 
 class _Course(NamedTuple):
-    """A sequence: its number, how many instants it has, and, where it was imported, its first sample's number."""
+    """A sequence: its number, its number of instants, and, if imported, its first sample's number."""
 
     number: int
     instants: int
@@ -78,8 +78,8 @@ class Kitti(Tree):
             yield from self._labels(sample, rig, car, name)
 
     def _sensor(self, sample: Sample) -> tuple[Rig | None, Car, int]:
-        """The rig, what it is to KITTI, and the sample's sensor by its place in it; of one camera, as imported and merged data
-        sets may have it, where the shot is not known. Raises UserError for another sensor there.
+        """The rig, its role as KITTI's car, and the place of the sample's sensor in the rig. If the shot is unknown, as in
+        imported and merged data sets, the rig is a single camera. Raises UserError for any other sensor then.
         """
         if sample.origin is not None or sample.sensor != CAMERA:
             shot, _, place = self._timeline.taken(sample)
@@ -87,20 +87,20 @@ class Kitti(Tree):
         return None if sample.known_camera is None else Rig.of(sample.known_camera.intrinsics), Car(0), 0
 
     def _course(self, sample: Sample) -> _Course:
-        """The sequence that a sample is of; raises UserError for a still picture."""
+        """The sequence of a sample. Raises UserError for a still picture."""
         if sample.origin is None and sample.sequence:
             return self._unplanned(sample.sequence)
         course = self._timeline.course(sample)
         return _Course(course.number, course.instants, None)
 
     def _found(self, name: str) -> _Course:
-        """An imported sequence, as long as its last picture's number; KITTI's own sequences keep their numbers."""
+        """An imported sequence, with its length from its last picture's number; KITTI's own sequences keep their numbers."""
         samples, known = self.dataset.sequence(name), self.dataset.sequences
         are_numbers = all(re.fullmatch("[0-9]{4}", one) for one in known)
         return _Course(int(name) if are_numbers else known.index(name), samples[-1].instant + 1, samples[0].index)
 
     def _labels(self, sample: Sample, rig: Rig | None, car: Car, name: str) -> Iterator[File | Piece]:
-        """The lines of a frame's objects, and how its cameras are calibrated, where that is known."""
+        """The lines of a frame's objects and, if known, the calibration of its cameras."""
         seen = [o for o in sample.objects if o.box2d is not None]
         rows = [row(o, type_of(o.category), self._task == "tracking") for o in seen]
         regions = [nobody_cares(box) for box in (sample.source or {}).get(DONT_CARE, ())]
@@ -123,13 +123,13 @@ class Kitti(Tree):
             yield line("evaluate_tracking.seqmap.training", number, "empty", "000000", f"{course.instants:06d}")
 
     def _check_lens(self, sample: Sample, car: Car) -> None:
-        """Raise UserError where a sequence zooms, of which there is one calibration."""
+        """Raise UserError if a sequence zooms, because it has only one calibration."""
         start = next(self._timeline.shots(self._timeline.course(sample)))
         if start.camera(next(start.samples)[1], car.left).intrinsics != sample.camera.intrinsics:
             raise UserError(f"kitti: expected one lens all through a sequence; found another in frame {sample.index}")
 
 
 def _text(calibrated: Mapping[str, Float], task: str) -> bytes:
-    """The text of a calibration, in a task's words."""
+    """The text of a calibration, with the keys of a task."""
     others = (np.eye(3), calibrated["velo"], np.eye(3, 4))
     return calibration_text(calibrated, *zip(CALIBRATED[task], others, strict=True))

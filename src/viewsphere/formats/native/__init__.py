@@ -27,11 +27,11 @@ if TYPE_CHECKING:
     from viewsphere.store import Dataset
     from viewsphere.store.foreign import ForeignDataset
 
-# Plans call none of these functions but `refuses`, so each imports its code when it is called.
+# Plans call only `refuses`, so each function imports its code when it is called.
 
 
 def refuses(scope: Scope) -> Iterator[str]:
-    """Pictures of which none has a known camera and viewpoint."""
+    """Reasons to refuse: no picture has a known camera and viewpoint."""
     yield from any_view(scope)
 
 

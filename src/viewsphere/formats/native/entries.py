@@ -24,7 +24,7 @@ class Entry(NamedTuple):
 
 
 def entries_of(dataset: Dataset, sample: Sample) -> list[Entry]:
-    """The entries of a sample's objects; none where the layout has no place for it."""
+    """The entries of a sample's objects; none if the layout has no place for the sample."""
     if not _is_of_a_pose(sample):
         return []
     number = sample.pose.index
@@ -39,8 +39,8 @@ def _is_of_a_pose(sample: Sample) -> bool:
 
 
 def files(dataset: Dataset, sample: Sample) -> Iterator[Expected]:
-    """The files of a sample: picture, depth and masks, with their paths from the export's folder; none where the layout has no
-    place for it.
+    """The files of a sample: picture, depth and masks, with their paths from the export's folder; none if the layout has no
+    place for the sample.
     """
     if not _is_of_a_pose(sample):
         return
@@ -73,7 +73,7 @@ def _stem(dataset: Dataset, sample: Sample, o: ObjectAnnotation) -> str:
 
 
 def _object_name(dataset: Dataset, sample: Sample, o: ObjectAnnotation) -> str:
-    """An object's name in its pose: its model's key, with numbers where the key is not unique."""
+    """An object's name in its pose: its model's key, with numbers if the key is not unique."""
     plan = dataset.plan
     is_product = all(part.is_product or not part.is_sampled for part in plan.parts)
     one_a_pose = is_product and dataset.max_objects == 1 and plan.frames <= len(plan.models) * plan.poses
@@ -94,8 +94,8 @@ def _group(dataset: Dataset, sample: Sample) -> str:
 
 
 def _pose(dataset: Dataset, sample: Sample) -> dict[str, Any]:
-    """The JSON keys of a sample's pose, but for the list of rendered objects; where models have viewpoints of their own at a
-    pose, those of its first frame.
+    """The JSON keys of a sample's pose, except the list of rendered objects. If models have separate viewpoints at a pose, the
+    keys describe its first frame.
     """
     viewpoint = sample.pose
     return {
@@ -119,7 +119,7 @@ def _viewpoint(sample: Sample) -> dict[str, Any]:
 
 
 def _rendered(sample: Sample, o: ObjectAnnotation, mask: str, files: Mapping[str, str]) -> dict[str, Any]:
-    """An object's entry; all objects of a frame share the files of its first one, but for the mask."""
+    """An object's entry; all objects of a frame share the files of the first one, except the mask."""
     bent = sample.camera.lens.record
     return {
         "path_rgb": files.get(picture_of(files) or ""),

@@ -97,7 +97,7 @@ def _load(file: Path) -> tuple[dict[str, Any], dict[str, Any], str]:
 
 
 def _is_name(text: str) -> bool:
-    """Return whether a text is the name of one folder, which gets a longer one while it is written."""
+    """Return whether a text can name one folder, with room for the longer name that the folder has while it is written."""
     return is_name(text) and len(text.encode()) <= LONGEST_NAME
 
 
@@ -112,7 +112,7 @@ def _categories(vehicles: Mapping[str, Any]) -> dict[str, Category]:
 def _models(
     root: Path, vehicles: dict[str, Any], categories: Mapping[str, Category], problems: list[str]
 ) -> Iterator[ForeignModel]:
-    """The models whose files are there, each with its time steps if it deforms."""
+    """The models with existing files, each with its time steps if it deforms."""
     found = list(_vehicles(root, vehicles, categories, problems))
     steps: defaultdict[str, list[ModelInfo]] = defaultdict(list)
     for model in found:
@@ -122,7 +122,7 @@ def _models(
         info = model.info
         if not info.track:
             yield replace(model, info=replace(info, steps=tuple(steps[info.key])))
-        elif info.track not in known:  # what was chosen of a data set may lack the model itself
+        elif info.track not in known:  # a selection from a data set may lack the model itself
             known.add(info.track)
             yield replace(model, info=replace(info, key=info.track, track="", steps=tuple(steps[info.track])))
 
@@ -130,7 +130,7 @@ def _models(
 def _vehicles(
     root: Path, vehicles: dict[str, Any], categories: Mapping[str, Category], problems: list[str]
 ) -> Iterator[ForeignModel]:
-    """The models, and time steps of those that deform, whose files are there."""
+    """The models with existing files, and the time steps of deforming ones."""
     for key, vehicle in vehicles.items():
         try:
             file = file_inside(root, str(vehicle.get("model_file")))
@@ -196,7 +196,7 @@ def _frame(
     folder = PurePosixPath(pose.get("folder", f"Pose-{number}"))
     matrix = first.get("transformation_matrix") or pose["transformation_matrix"]
     camera = _camera(matrix, first["render_resolution"], first.get("distortion"))
-    view: Mapping[str, Any] = first.get("viewpoint") or pose  # the paper's own files have one a pose
+    view: Mapping[str, Any] = first.get("viewpoint") or pose  # the paper's own files have one for each pose
     split = str(first.get("split") or "train")
     if not _is_name(split) or not 0 <= int(number) < LARGEST_POSE:
         raise ValueError(f"found pose {number} of split {split!r}")
@@ -299,7 +299,7 @@ def _object(number: int, category: Category, key: str, mask: NDArray[np.bool_], 
 
 
 def _known(entry: dict[str, Any]) -> tuple[NDArray[np.float64], float | None, float | None]:
-    """3D box in pixels (8, 2), visibility and truncation, each if given; raises for malformed values."""
+    """3D box in pixels (8, 2), visibility and truncation, as far as given. Raises an error for malformed values."""
     shares = entry.get("visibility"), entry.get("truncation")
     visibility, truncation = (None if share is None else _number(share) for share in shares)
     return _vertices(entry.get("bbox_3D_pxs"), 2), visibility, truncation

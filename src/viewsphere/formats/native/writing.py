@@ -52,7 +52,7 @@ def writer(dataset: Dataset, folder: Path, note: Callable[[str], None]) -> Gener
 
 @contextmanager
 def poses(dataset: Dataset, folder: Path) -> Generator[Callable[[Sequence[Entry]], None]]:
-    """Write the file into this folder: gives a function that appends a frame's entries.
+    """Write the file into this folder. Yields a function that appends a frame's entries.
 
     Entries wait in a temporary file, and their positions in an SQLite table, which moves to disk once it is long.
     """
@@ -71,7 +71,7 @@ def poses(dataset: Dataset, folder: Path) -> Generator[Callable[[Sequence[Entry]
 
 
 def _places(entries: Sequence[Entry], waiting: IO[bytes]) -> Iterator[Place]:
-    """Write a frame's entries, each behind the keys of its pose."""
+    """Write a frame's entries, each after the keys of its pose."""
     for entry in entries:
         head = waiting.tell()
         start = head + waiting.write(entry.keys)
@@ -79,7 +79,7 @@ def _places(entries: Sequence[Entry], waiting: IO[bytes]) -> Iterator[Place]:
 
 
 def _write_poses(file: IO[bytes], waiting: IO[bytes], places: Iterable[Place]) -> None:
-    """Copy the entries, gathered by pose; the keys of a pose are those of its first frame."""
+    """Copy the entries, gathered by pose; a pose has the keys of its first frame."""
     last = None
     for number, head, start, stop in places:
         waiting.seek(head)

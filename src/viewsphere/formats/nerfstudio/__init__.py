@@ -65,7 +65,7 @@ FISHEYE, STANDARD = ("k1", "k2", "k3", "k4"), ("k1", "k2", "p1", "p2", "k3")
 """Names of coefficients, in OpenCV's order."""
 
 MOST = {"nerfstudio": 5, "instant-ngp": 4, SYNTHETIC: 0}
-"""Coefficients of a lens, by whose files they are."""
+"""Coefficients of a lens, by the kind of file."""
 
 
 FOLDERS = ("", "exports/mesh", "exports/poisson", "exports/tsdf", "exports")
@@ -73,8 +73,8 @@ FOLDERS = ("", "exports/mesh", "exports/poisson", "exports/tsdf", "exports")
 
 
 def again(path: Path) -> SourceCameras:
-    """Return every camera of a world's folder, or of one of its files. Pictures are required only where the file does not give
-    w and h. Raises StoreError where there is no such file, and for a frame that lacks its lens or its pose.
+    """Return every camera of a world's folder, or of one of its files. Pictures are required only if the file does not give w
+    and h. Raises StoreError if there is no such file, and for a frame that lacks its lens or its pose.
     """
     problems: list[str] = []
     shots: dict[str, ListedShot] = {}
@@ -104,7 +104,7 @@ POINT = np.dtype([("x", "<f4"), ("y", "<f4"), ("z", "<f4"), ("red", "u1"), ("gre
 
 
 class Options(Frozen):
-    """The program that reads the export, and the pixels that it trains on."""
+    """The program that reads the export, and the pixels used for training."""
 
     kind: Literal["nerfstudio", "instant-ngp", "nerf-synthetic"] = Field(
         default="nerfstudio", description="whose files: `nerfstudio`, `instant-ngp`, or `nerf-synthetic`, NeRF's own scenes"
@@ -119,7 +119,7 @@ def needs(options: Options) -> tuple[str, ...]:
 
 
 def refuses(scope: Scope, options: Options) -> Iterator[str]:
-    """Cameras that nobody knows, and lenses that are not in the files' words."""
+    """Reasons to refuse: unknown cameras, and lenses that the files cannot express."""
     if options.masks and options.kind != "nerfstudio":
         yield f"expected masks with kind nerfstudio; found {options.kind}"
     yield from refusals.lacking_labels(scope, needs(options))
@@ -140,7 +140,7 @@ class Nerfstudio(Tree):
         self._rigs = Rigs(dataset)
 
     def of(self, sample: Sample) -> Iterator[File | Piece]:
-        """A picture, its depth, and what is said of it."""
+        """A picture, its depth, and its entry."""
         lens, now, world = sample.camera.intrinsics, self._rigs.at(sample), world_of(self.dataset, sample)
         problem = _lens_problem(lens, self._kind)
         if problem:
@@ -165,7 +165,7 @@ class Nerfstudio(Tree):
             yield _points(f"{world}/points.ply", sample)
 
     def layout(self, path: str, counts: Mapping[str, int]) -> Layout:
-        """The head of a file, and its frames."""
+        """The header of a file, and its frames."""
         if path.endswith(".ply"):
             return (ply_head(POINT, counts[""]), "")
         if self._kind == SYNTHETIC:
@@ -238,13 +238,13 @@ def _lens_problem(lens: Intrinsics, kind: str) -> str | None:
 
 
 def _model_of(lens: Intrinsics) -> str:
-    """The name of its model."""
+    """The name of a lens' model."""
     own = lens.lens.opencv
     return "OPENCV_FISHEYE" if own and own.is_fisheye else "OPENCV"
 
 
 def _said_of(lens: Intrinsics, kind: str) -> dict[str, Any]:
-    """Its numbers by their names: sizes and K in pixels from the corner, and coefficients."""
+    """A lens' numbers by their names: sizes and K in pixels from the corner, and coefficients."""
     said: dict[str, Any] = {"w": lens.width, "h": lens.height, "fl_x": lens.fx, "fl_y": lens.fy, "cx": lens.cx, "cy": lens.cy}
     if own := lens.lens.opencv:
         said |= dict(zip(FISHEYE if own.is_fisheye else STANDARD, own.coefficients[: MOST[kind]], strict=False))

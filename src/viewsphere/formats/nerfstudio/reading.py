@@ -34,9 +34,9 @@ MODELS = ("OPENCV", "OPENCV_FISHEYE", "PINHOLE", "SIMPLE_PINHOLE")
 def read(path: Path, *, keep_going: bool = False) -> ForeignDataset:
     """Return every picture of a world's folder, or of one of its files, with cameras and depth; no objects.
 
-    Splits are the file's lists, or come from transforms_<split>.json; without these all is `train`. Values beside the frames in
-    the file are defaults for its frames. Raises StoreError with every frame that lacks its picture, its lens or its pose; with
-    `keep_going` these are left out and reported.
+    Splits are the file's lists, or come from transforms_<split>.json; otherwise all pictures are `train`. Values beside the
+    frames in the file are defaults for its frames. Raises StoreError with every frame that lacks its picture, its lens or its
+    pose; with `keep_going` these are left out and reported.
     """
     files = transforms_files(path)
     problems: list[str] = []
@@ -48,7 +48,9 @@ def read(path: Path, *, keep_going: bool = False) -> ForeignDataset:
 
 
 def transforms_files(folder: Path) -> list[Path]:
-    """transforms.json of a folder, else a file a split, train first; a file itself. Raises StoreError where there is none."""
+    """The transforms.json of a folder, or else its files by split, train first. A file stands for itself. Raises StoreError if
+    there are none.
+    """
     if folder.is_file():
         return [folder]
     whole = folder / "transforms.json"
@@ -75,7 +77,7 @@ def _pictures(file: Path, problems: list[str]) -> Iterator[Posed]:
 
 
 def said_frames(file: Path) -> Iterator[tuple[int, Mapping[str, Any], Mapping[str, set[str]]]]:
-    """The number of each frame, what is said of it or beside the frames, and the files that are listed of each split. Raises
+    """The number of each frame, its values including the file's defaults, and the files listed for each split. Raises
     StoreError for a file of another structure.
     """
     try:
@@ -113,7 +115,7 @@ def _picture(file: Path, said: Mapping[str, Any], lists: Mapping[str, set[str]])
 
 
 def name_of(said: Mapping[str, Any]) -> str:
-    """The path of a frame's picture; raises ValueError where it has none."""
+    """The path of a frame's picture. Raises ValueError if it has none."""
     name = said["file_path"]
     if not isinstance(name, str) or not PurePosixPath(name).parts:
         raise ValueError(f"expected a file_path; found {name!r:.60}")
@@ -121,7 +123,7 @@ def name_of(said: Mapping[str, Any]) -> str:
 
 
 def split_of(file: Path, name: str, lists: Mapping[str, set[str]]) -> str:
-    """The split of the picture of a name; raises ValueError for one that is no name."""
+    """The split of a picture, from the lists, its folder or the file's name. Raises ValueError for an invalid name."""
     folder = PurePosixPath(name).parts[0]
     split = next((split for split in SPLITS if name in lists.get(split, ())), folder if folder in SPLITS else _split(file))
     if not is_name(split):
@@ -130,7 +132,7 @@ def split_of(file: Path, name: str, lists: Mapping[str, set[str]]) -> str:
 
 
 def pose_said(said: Mapping[str, Any]) -> NDArray[np.float64]:
-    """The pose of a frame, world_from_camera (3, 4), OpenCV's axes; raises ValueError for another matrix."""
+    """The pose of a frame, world_from_camera (3, 4), OpenCV's axes; raises ValueError for any other matrix."""
     try:
         pose = np.array(said["transform_matrix"], np.float64)
     except (TypeError, ValueError):
@@ -151,7 +153,7 @@ def _number(said: Mapping[str, Any], name: str, other: float) -> float:
 
 
 def lens_of(said: Mapping[str, Any], size: tuple[int, int]) -> Intrinsics:
-    """The lens of a frame, whose picture has a size; raises ValueError for one that viewsphere does not have."""
+    """The lens of a frame whose picture has this size. Raises ValueError for a lens that viewsphere does not support."""
     width, height = (int(_number(said, name, own)) for name, own in zip("wh", size, strict=True))
     fx, angle = _number(said, "fl_x", 0.0), _number(said, "camera_angle_x", 0.0)
     if not (fx or angle):

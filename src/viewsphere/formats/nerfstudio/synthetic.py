@@ -1,4 +1,4 @@
-"""NeRF's synthetic scenes: a file a split, with one angle of view for all of its pictures."""
+"""NeRF's synthetic scenes: a file for each split, with one angle of view for all of its pictures."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ SPLITS = ("train", "val", "test")
 
 
 def synthetic_files(sample: Sample, world: str, stem: str) -> Iterator[File | Piece]:
-    """A picture, and its entry, which each of the files has in a section for its split and its angle of view."""
+    """A picture and its entry; each file has a section for its split and its angle of view."""
     split, lens = sample.split or SPLITS[0], sample.camera.intrinsics
     yield File(f"{world}/{split}/{stem}.png", _with_alpha(sample))
     entry = {"file_path": f"./{split}/{stem}", "transform_matrix": opengl_pose(sample.camera).tolist()}
@@ -26,7 +26,7 @@ def synthetic_files(sample: Sample, world: str, stem: str) -> Iterator[File | Pi
 
 
 def synthetic_layout(path: str, counts: Mapping[str, int]) -> Layout:
-    """A split's frames, or, where it has none, those of the first."""
+    """A split's frames, or the first split's frames if it has none."""
     sections = [section.rsplit(" ", 1) for section in counts]
     angle = sections[0][1]
     if len({other for _, other in sections}) > 1:
@@ -37,7 +37,7 @@ def synthetic_layout(path: str, counts: Mapping[str, int]) -> Layout:
 
 
 def _with_alpha(sample: Sample) -> Content:
-    """The picture as PNG, with its alpha where it is kept."""
+    """The picture as PNG, with its alpha if that is stored."""
     file = sample.files.get("rgba")
     if "rgba" not in sample.channels:
         return picture(sample, ".png")

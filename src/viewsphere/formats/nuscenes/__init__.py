@@ -65,7 +65,7 @@ class Options(Frozen):
 
 
 def refuses(scope: Scope, options: Options) -> Iterator[str]:
-    """Still pictures, lenses, and names that would be one."""
+    """Reasons to refuse: still pictures, distorted lenses, and names that would coincide."""
     yield from sequences(scope)
     yield from unknown_shots(scope)
     yield from pinhole(scope)
@@ -102,7 +102,7 @@ class NuScenes(Tree):
         if sample.index == there[0]:
             yield from self._items(view.of_instant())
             yield from self._items(view.of_objects([self._at(index) for index in there]))
-            for table in ("instance", "sample_annotation"):  # of no object they are there, too
+            for table in ("instance", "sample_annotation"):  # the files exist even without objects
                 yield Piece(f"{self._version}/{table}.json", b"", "there")
             if sample.instant == story.instants[0]:
                 yield from (item(f"{self._version}/splits.json", view.scene, split or "all") for split in story.splits)
@@ -125,7 +125,7 @@ class NuScenes(Tree):
         yield File(f"maps/{MAP}.png", encode_png(np.zeros((16, 16), np.uint8)))
 
     def layout(self, path: str, counts: Mapping[str, int]) -> Layout:
-        """Lists, but for the scenes of each split."""
+        """JSON lists, except for the scenes of each split."""
         if not path.endswith("/splits.json"):
             return LIST
         starts = (f"{mark}\n{json.dumps(name)}:[".encode() for mark, name in zip("{" + "," * len(counts), counts, strict=False))

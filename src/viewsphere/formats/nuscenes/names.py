@@ -1,4 +1,4 @@
-"""Names as nuScenes has them: of records, of categories, and of sensors."""
+"""nuScenes' names of records, categories and sensors."""
 
 from __future__ import annotations
 
@@ -22,11 +22,11 @@ CATEGORIES = {
     "trailer": "vehicle.trailer",
     "truck": "vehicle.truck",
 }
-"""nuScenes' names of what other data sets have in one word."""
+"""nuScenes' names for categories that other data sets name in one word."""
 
 
 def token(*names: object) -> str:
-    """The token of a record, which follows from what it is of: 32 hexadecimal digits."""
+    """The token of a record, derived from its subject: 32 hexadecimal digits."""
     return blake2b("\n".join(map(str, names)).encode(), digest_size=16).hexdigest()
 
 
@@ -35,12 +35,12 @@ LOG, MAP = token("log"), token("map")
 
 
 def category_of(name: str) -> str:
-    """nuScenes' name of a category, or its own."""
+    """nuScenes' name of a category, or the category's own name."""
     return CATEGORIES.get(name.casefold(), name)
 
 
 def channels_of(rig: Rig) -> tuple[str, ...]:
-    """The channels of a rig's sensors, in its order."""
+    """The channels of a rig's sensors, in the rig's order."""
     lidars = sum(sensor.lidar is not None for sensor in rig.sensors)
     found: list[str] = []
     for sensor in rig.sensors:

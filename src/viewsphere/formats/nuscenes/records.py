@@ -21,10 +21,10 @@ Record = dict[str, Any]
 
 LEVELS = ("v0-40", "v40-60", "v60-80", "v80-100")
 BOUNDS = (0.4, 0.6, 0.8)
-"""Shares of an object that are seen, from which on the next level of visibility holds."""
+"""Visible shares of an object at which the next level of visibility begins."""
 
 OBJECT_FROM_BOX = np.array([[0.0, 1, 0], [-1, 0, 0], [0, 0, 1]])
-"""From a box's axes (x ahead, y left, z up) to those of our objects, whose front is -y."""
+"""The rotation from a box's axes (x ahead, y left, z up) to viewsphere's object axes, with the front at -y."""
 
 
 def visibilities() -> list[Record]:
@@ -36,18 +36,18 @@ def visibilities() -> list[Record]:
 
 
 def category(one: Category) -> Record:
-    """A category; its description is the data set's name of it."""
+    """A category; its description is its name in the data set."""
     return {"token": token("category", one.id), "name": category_of(one.name), "description": one.name, "index": one.id}
 
 
 def chain(instants: Sequence[int], instant: int, name: Callable[[int], str]) -> Record:
-    """Tokens of the records before and behind one, empty at the ends."""
+    """Tokens of the previous and the next record, empty at the ends."""
     before, behind = neighbours(instants, instant)
     return {"prev": "" if before is None else name(before), "next": "" if behind is None else name(behind)}
 
 
 def placed(matrix: Float) -> Record:
-    """A rigid matrix (4, 4) as a place and a quaternion."""
+    """A rigid matrix (4, 4) as a position and a quaternion."""
     return {"translation": matrix[:3, 3].tolist(), "rotation": list(quaternion_from_matrix(matrix[:3, :3]))}
 
 
@@ -63,7 +63,7 @@ def world_from_ego(world_from_rig: Float) -> Record:
 
 
 def matrix_of(lens: Intrinsics) -> list[list[float]]:
-    """K, row by row, its origin in the first pixel's centre."""
+    """K, row by row, with the origin in the first pixel's centre."""
     return centred(lens.K).tolist()
 
 

@@ -12,8 +12,8 @@ from viewsphere.model.sensors.camera import Intrinsics
 
 @dataclass(frozen=True)
 class Story:
-    """The instants of a sequence that are in the data set: all, and, by its place in the rig or by its id, those of each sensor
-    and each object; the sensors' lenses at first; and the splits of its pictures.
+    """The instants of a sequence in the data set: all of them, by sensor (its place in the rig) and by object id. Also the
+    sensors' first lenses, and the splits of the sequence's pictures.
     """
 
     instants: tuple[int, ...]
@@ -43,6 +43,6 @@ def story_of(timeline: Timeline, course: Course) -> Story:
 
 
 def neighbours(instants: Sequence[int], instant: int) -> tuple[int | None, int | None]:
-    """The instants before and behind one of some, None at their ends."""
+    """The previous and the next instant in a list, None at its ends."""
     place = bisect_left(instants, instant)
     return instants[place - 1] if place else None, instants[place + 1] if place + 1 < len(instants) else None

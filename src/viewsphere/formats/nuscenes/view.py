@@ -1,4 +1,4 @@
-"""One sample and what is known of its sequence: the records that it adds to nuScenes' tables."""
+"""One sample with its sequence, and the records that it adds to nuScenes' tables."""
 
 from __future__ import annotations
 
@@ -20,17 +20,17 @@ from viewsphere.model.sensors.lidar import LIDAR
 from viewsphere.model.shot import Shot
 
 APART_S = 3600
-"""Seconds from the beginning of a scene to that of the next: the development kit sorts scenes by them."""
+"""Seconds between the starts of successive scenes: the development kit sorts scenes by time."""
 
 KINDS = (".png", ".jpg")
 
 Rows = Iterator[tuple[str, records.Record]]
-"""Tables' names, and records of theirs."""
+"""Names of tables, each with one of its records."""
 
 
 @dataclass(frozen=True, eq=False)
 class View:
-    """A sample, its shot, its instant and its sensor there, and its sequence."""
+    """A sample, its shot, its instant and its sensor in the shot, and its sequence."""
 
     sample: Sample
     shot: Shot
@@ -41,7 +41,7 @@ class View:
 
     @property
     def scene(self) -> str:
-        """The name of its scene."""
+        """The name of the sample's scene."""
         return f"scene-{self.course.number + 1:04d}"
 
     @property
@@ -51,20 +51,20 @@ class View:
 
     @property
     def timestamp(self) -> int:
-        """Microseconds."""
+        """The sample's time, microseconds."""
         return round((APART_S * self.course.number + self.sample.time) * 1e6)
 
     def token(self, table: str, *names: object) -> str:
-        """The token of a record of its sequence."""
+        """The token of a record of the sample's sequence."""
         return token(table, self.sample.sequence, *names)
 
     def file(self, channel: str) -> str:
-        """The path of its picture or points."""
+        """The path of the sample's picture or points."""
         suffix = ".pcd.bin" if self.modality == "lidar" else suffix_of(self.sample, *KINDS)
         return f"samples/{channel}/{self.scene}__{channel}__{self.sample.instant:06d}{suffix}"
 
     def of_sensor(self, channel: str) -> Rows:
-        """The record of its file, and, at first and where the camera zooms, of how the sensor is calibrated."""
+        """The record of the sample's file and, for the first sample or a zooming camera, of the sensor's calibration."""
         instant, lens, own = self.sample.instant, self.sample.camera.intrinsics, self.story.sensors[self.place]
         zooms, is_camera = lens != self.story.lenses[self.place], self.modality == "camera"
         calibrated = self.token("calibrated_sensor", channel, *([instant] if zooms else []))
@@ -97,7 +97,7 @@ class View:
         )
 
     def of_instant(self) -> Rows:
-        """The records of its instant, and, of the first one, of the scene."""
+        """The records of the sample's instant and, at the first instant, of the scene."""
         instant, instants = self.sample.instant, self.story.instants
         ego = records.world_from_ego(np.array(self.shot.instants[self.instant].world_from_rig))
         yield "ego_pose", {"token": self.token("ego_pose", instant), "timestamp": self.timestamp, **ego}
@@ -111,7 +111,7 @@ class View:
             yield "scene", {"token": scene, "log_token": LOG, "nbr_samples": len(instants), **samples, **named}
 
     def of_objects(self, seen: Sequence[Sample]) -> Rows:
-        """The records of its instant's objects, as these samples of it show them."""
+        """The records of the instant's objects, as shown by these samples."""
         points, shares, instant = _hits(seen), _shares(seen), self.sample.instant
         for o in self.sample.objects:
             own, instance = self.story.objects[o.id], self.token("instance", o.id)

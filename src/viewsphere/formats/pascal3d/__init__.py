@@ -66,7 +66,7 @@ from viewsphere.plugins.format import FormatSpec
 
 
 def check() -> None:
-    """Raise MissingExtraError where there is no scipy."""
+    """Raise MissingExtraError if scipy is missing."""
     scipy_io("pascal3d")
 
 
@@ -76,7 +76,7 @@ def needs(options: Options) -> tuple[str, ...]:
 
 
 def refuses(scope: Scope, options: Options) -> Iterator[str]:
-    """Numbers of 8 bits, and what no viewpoint can tell."""
+    """Reasons to refuse: more categories or objects than 8 bits can number, and data that viewpoints cannot describe."""
     yield from no_viewpoints(scope)
     yield from most_categories(scope, MOST - len(CLASSES))
     yield from most_objects(scope, MOST)

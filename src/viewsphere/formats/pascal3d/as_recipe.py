@@ -1,4 +1,4 @@
-"""PASCAL3D+'s pictures with the CAD models that they show, to be rendered again."""
+"""PASCAL3D+'s pictures with the CAD models that they show, for rendering them again."""
 
 from __future__ import annotations
 
@@ -38,9 +38,9 @@ class _Group:
 def again(path: Path) -> SourceCameras:
     """Return every picture with objects of known viewpoint, in the folder of a release, and the CAD models that they show.
 
-    A picture is one shot where its objects have one lens, as where the record gives K. Else it is one shot for each lens,
-    because the format's projection has the principal point at an object's origin in the picture. The world is the world of a
-    shot's first object. Raises StoreError for invalid records, and for objects without a CAD model.
+    A picture is one shot if its objects share one lens, as they do if the record gives K. Otherwise it is one shot for each
+    lens, because the format's projection has the principal point at an object's origin in the picture. The world is the world
+    of a shot's first object. Raises StoreError for invalid records, and for objects without a CAD model.
     """
     if not any(path.glob("Annotations/*/*.mat")):
         raise StoreError(f"{path}: expected PASCAL3D+ (Annotations/<category>_pascal/<index>.mat); found no such file")
@@ -77,7 +77,7 @@ def again(path: Path) -> SourceCameras:
 
 
 def _size(root: Path, told: Told, record: Record) -> tuple[int, int]:
-    """The width and height of a picture, as its record says where it is not there."""
+    """The width and height of a picture; from its record if the picture is missing."""
     there = picture_of(root, told, record)
     size = there[1] if there else record.size
     if size is None:
@@ -134,14 +134,14 @@ def _shot(models: _Models, group: _Group, name: str, image: str, split: str) -> 
 
 @dataclass(frozen=True)
 class _Models:
-    """The CAD models that are asked for: OFF files, else those of a category's MATLAB file."""
+    """The requested CAD models: OFF files, or else the models of a category's MATLAB file."""
 
     root: Path
     found: dict[str, SourceModel]
     words: dict[str, str]
 
     def key(self, category: str, number: int) -> str:
-        """The key of a model, counted from 1; raises StoreError where there is none."""
+        """The key of a model, counted from 1. Raises StoreError if there is no such model."""
         if not is_name(category):
             raise ValueError(f"found a category {category!r:.60}")
         key = f"{category} {number}"
@@ -151,7 +151,7 @@ class _Models:
         return key
 
     def _word(self, category: str) -> str:
-        """A category's name in letters, digits, `_` and `-`, unlike those of others."""
+        """A category's unique name in letters, digits, `_` and `-`."""
         if category not in self.words:
             plain = re.sub(r"[^A-Za-z0-9_-]", "_", category).lstrip("_-")[:90] or "model"
             taken = {word.casefold() for word in self.words.values()}

@@ -1,4 +1,4 @@
-"""PASCAL3D+'s CAD models, as others may have made them, on their way into a store."""
+"""PASCAL3D+'s CAD models from other sources, for import into a store."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ Float = NDArray[np.float64]
 
 
 def read_cads(root: Path, categories: Mapping[str, Category], problems: list[str]) -> dict[str, list[ForeignModel]]:
-    """The models of each category that has a file of them, in their order; the problems of other files are appended."""
+    """The models of each category with a readable file, in their order; the problems of other files are appended."""
     found: dict[str, list[ForeignModel]] = {}
     for name, category in categories.items():
         file = root / f"CAD/{name}.mat"
@@ -50,7 +50,7 @@ def _model(said: Mapping[str, Any], category: Category, key: str) -> ForeignMode
 
 
 def read_shapes(file: Path, category: str) -> tuple[tuple[Float, NDArray[np.int32]], ...]:
-    """Vertices (V, 3) and triangles (T, 3) of a category's models; raises StoreError for a file that has none."""
+    """Vertices (V, 3) and triangles (T, 3) of a category's models; raises StoreError for a file without models."""
     try:
         structs = structs_of(variables(file).get(category), f"a struct array {category}")
         return tuple(_shape(one.get("vertices"), one.get("faces")) for one in structs)
@@ -83,7 +83,7 @@ def _is_table(array: Any) -> bool:
 
 
 def _normals(vertices: NDArray[np.float32], triangles: NDArray[np.int32]) -> NDArray[np.float32]:
-    """Of each vertex (V, 3): the mean of its triangles', by their areas; up where they have none."""
+    """The normal of each vertex, (V, 3): the area-weighted mean of its triangles' normals; up if that is zero."""
     a, b, c = (vertices[triangles[:, i]].astype(np.float64) for i in range(3))
     found, across = np.zeros((len(vertices), 3)), np.cross(b - a, c - a)
     for corner in range(3):
@@ -93,7 +93,7 @@ def _normals(vertices: NDArray[np.float32], triangles: NDArray[np.int32]) -> NDA
 
 
 def _points(said: Mapping[str, Any]) -> Iterator[tuple[str, Place]]:
-    """The named points that a model has."""
+    """The named points of a model."""
     for name, value in said.items():
         if name not in OWN and isinstance(value, np.ndarray) and value.size == 3:
             if not (np.abs(value) < FARTHEST).all():

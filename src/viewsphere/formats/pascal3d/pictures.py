@@ -15,15 +15,15 @@ from viewsphere.store.paths import file_inside, is_name
 
 SUFFIXES = (".jpg", ".JPEG", ".jpeg", ".JPG", ".png")
 FILES_KEPT = 64
-"""Records that are kept while pictures are gone through."""
+"""Number of records to keep while going through pictures."""
 
 Of = Callable[[Path], Record]
 
 
 @dataclass(frozen=True)
 class Told:
-    """A picture's source (pascal, imagenet), name and split, and the categories in whose folders it lies, each with the record
-    that is there.
+    """A picture's source (pascal, imagenet), name and split, and the categories whose folders contain it, each with its record
+    there.
     """
 
     source: str
@@ -35,7 +35,7 @@ class Told:
 
 def told_pictures(root: Path, record_of: Of, problems: list[str]) -> Iterator[Told]:
     """The pictures of all folders, each once, by source and name; the problems of lists, of records and of their objects are
-    appended. A picture of which a record cannot be read is left out.
+    appended. A picture with an unreadable record is left out.
     """
     folders: defaultdict[tuple[str, str], dict[str, Path]] = defaultdict(dict)
     for file in sorted((root / "Annotations").glob("*/*.mat")):
@@ -77,8 +77,8 @@ def _splits(root: Path, kinds: set[str], problems: list[str]) -> dict[tuple[str,
 
 
 def objects_of(told: Told, record_of: Of) -> list[Seen]:
-    """The objects of a picture, each of the record in the folder of its category, else of the first one; their ids are those
-    that all have, else they count from 1.
+    """The objects of a picture. Each comes from the record in its category's folder, or else from the first record. Their ids
+    are kept if all have one; otherwise they count from 1.
     """
     found: list[Seen] = []
     for number, (kind, file) in enumerate(zip(told.kinds, told.files, strict=True)):
@@ -91,8 +91,8 @@ def objects_of(told: Told, record_of: Of) -> list[Seen]:
 
 
 def picture_of(root: Path, told: Told, record: Record) -> tuple[Path, tuple[int, int]] | None:
-    """A picture, in the first folder that has it, and its width and height, None where it is nowhere; raises ValueError for one
-    of another size than K, if the record says it, is for.
+    """A picture in the first folder that contains it, with its width and height; None if it is missing. Raises ValueError if
+    the record gives K and the picture's size does not fit it.
     """
     places = [f"Images/{kind}_{told.source}/{told.name}{end}" for kind in told.kinds for end in SUFFIXES]
     there = next((place for place in places if (root / place).is_file()), None)

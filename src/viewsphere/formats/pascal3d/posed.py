@@ -1,4 +1,4 @@
-"""Objects of PASCAL3D+'s records as cameras see them."""
+"""The poses of PASCAL3D+'s objects in their cameras."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ class Posed:
 
 
 def posed(objects: Iterable[Seen], own: Intrinsics | None, size: tuple[int, int]) -> Iterator[Posed]:
-    """The objects of which the exact viewpoint and the model are known. `own`: the lens of a picture that says K."""
+    """The objects with a known exact viewpoint and model. `own`: the lens of a picture that gives K."""
     for seen in objects:
         if seen.cad and own is not None and seen.motion is not None:
             yield Posed(seen.kind, seen.cad, own, rigid(seen.motion[:, :3], seen.motion[:, 3]))
@@ -34,13 +34,13 @@ def posed(objects: Iterable[Seen], own: Intrinsics | None, size: tuple[int, int]
 
 
 def pinhole(k: Float, size: tuple[int, int]) -> Intrinsics:
-    """The lens of K (3, 3), of a picture of a width and a height."""
+    """The lens of K (3, 3), for a picture of this width and height."""
     (fx, skew, cx), (_, fy, cy), _ = k.tolist()
     return Intrinsics(width=size[0], height=size[1], fx=fx, fy=fy, cx=cx, cy=cy, skew=skew)
 
 
 def _by_viewpoint(seen: Seen, width: int, height: int) -> Posed:
-    """An object by the format's own projection, whose principal point is where the object's origin is seen."""
+    """An object by the format's own projection, with the principal point at the object's origin in the picture."""
     view = seen.view
     focal = view["viewport"] * view["focal"]
     lens = Intrinsics(width=width, height=height, fx=focal, fy=focal, cx=view["px"] - 0.5, cy=view["py"] - 0.5)

@@ -1,4 +1,4 @@
-"""A PASCAL3D+ data set made elsewhere: pictures by category, a record for each, masks, lists and CAD models."""
+"""A PASCAL3D+ data set from another source: pictures by category, a record for each, masks, lists and CAD models."""
 
 from __future__ import annotations
 
@@ -35,21 +35,21 @@ from viewsphere.store.paths import file_inside, is_name
 Float = NDArray[np.float64]
 
 PASCAL = "pascal"
-"""The source of pictures that have masks; that of others is imagenet."""
+"""The source of pictures with masks; other pictures have the source imagenet."""
 
 STATES = {1: 0, 2: 1, 3: 1, 4: 2}
-"""Of keypoints by the status of anchors: visible, occluded, outside; of others nobody knows (3)."""
+"""States of keypoints by the status of anchors: visible, occluded, outside; any other status is unknown (3)."""
 
 NEAR = 3.0
-"""Pixels by which a mask that overlaps its object's box too little may reach out of it."""
+"""Distance by which a mask with too little overlap may extend beyond its object's box, pixels."""
 
 SAME = 1e-9
-"""Share by which the focal lengths of one lens may differ: products of two numbers of 64 bits."""
+"""Share by which the focal lengths of one lens may differ: they are products of two 64-bit numbers."""
 
 
 @dataclass(frozen=True)
 class _Shown(Listed):
-    """A picture, what is told of it, and its map of objects, None where it has none."""
+    """A picture, its records, and its map of objects (None without a map)."""
 
     told: Told
     masks: Path | None
@@ -107,7 +107,7 @@ def _pictures(root: Path, record_of: Of, problems: list[str]) -> Iterator[_Shown
 
 
 def _picture(root: Path, told: Told, record: Record) -> _Shown:
-    """A picture of which all that is said can be read."""
+    """A picture with readable records."""
     there = picture_of(root, told, record)
     if there is None:
         raise ValueError(f"expected a picture; found no Images/{told.kinds[0]}_{told.source}/{told.name}")
@@ -135,8 +135,8 @@ def _sample(
 
 
 def _lens(known: Float | None, seen: Sequence[Seen], size: tuple[int, int]) -> Intrinsics | None:
-    """The lens of a picture: its own, else that of its viewpoints' focal length, whose axis meets the only object's origin, or
-    the middle of the picture where there are several; None where there is no viewpoint, or focal lengths differ.
+    """The lens of a picture: its own, or else a lens with its viewpoints' focal length. Its axis meets the origin of a single
+    object, or the middle of the picture with several objects. None without viewpoints, or if focal lengths differ.
     """
     width, height = size
     if known is not None:
@@ -157,7 +157,7 @@ def _annotation(
     lens: Intrinsics | None,
     mask: str | None,
 ) -> ObjectAnnotation:
-    """An object with its mask, model and pose, and as COCO would have it in `source`."""
+    """An object with its mask, model and pose; its `source` holds its COCO annotation."""
     x0, y0, x1, y1 = o.box
     source: dict[str, Any] = {"bbox": [x0, y0, x1 - x0, y1 - y0], "area": (x1 - x0) * (y1 - y0), **o.flags}
     source |= {"cad_index": o.cad, "viewpoint": dict(o.view)} if o.cad or o.view else {}
@@ -169,7 +169,7 @@ def _annotation(
 
 
 def _masks(file: Path, seen: Sequence[Seen]) -> Iterator[str | None]:
-    """The run-length code of each object's mask; None for one of nothing, or that is another object's by its box."""
+    """The run-length code of each object's mask; None for an empty mask, or one that belongs to another object by its box."""
     numbers = numbers_of(file)
     found = boxes_of(numbers)
     for o, number in zip(seen, numbered([(o.place, o.box) for o in seen], found), strict=True):
@@ -191,7 +191,7 @@ def _keypoints(o: Seen) -> dict[str, Any]:
 
 
 def _standing(o: Seen, box: Float | None, lens: Intrinsics | None) -> dict[str, Any]:
-    """Return the known fields of an object's place: its pose, or only a coarse view, or nothing."""
+    """Return the known fields of an object's position: its pose, only a coarse view, or nothing."""
     motion = o.motion if o.motion is not None else _turned(o.view, lens) if o.is_fine and lens is not None else None
     if motion is not None:
         pose = rigid(motion[:, :3], motion[:, 3])
@@ -206,8 +206,8 @@ def _standing(o: Seen, box: Float | None, lens: Intrinsics | None) -> dict[str, 
 
 
 def _turned(view: Mapping[str, float], lens: Intrinsics) -> Float:
-    """RT (3, 4) of a viewpoint: the camera that looks at the model from there, turned the shortest way so that px, py is where
-    the model's origin is seen.
+    """RT (3, 4) of a viewpoint: the camera looks at the model from there, and is turned the shortest way that puts the model's
+    origin at px, py.
     """
     angles = (math.radians(view[name]) for name in ("azimuth", "elevation", "theta"))
     y = (view["py"] - 0.5 - lens.cy) / lens.fy

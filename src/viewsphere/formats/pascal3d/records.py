@@ -1,4 +1,4 @@
-"""Records of PASCAL3D+'s annotations, as others may have written them."""
+"""Records of PASCAL3D+'s annotations from other sources."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from viewsphere.model.sample import Box
 Float = NDArray[np.float64]
 
 FARTHEST = 1e6
-"""Pixels, degrees or lengths beyond which no number of an annotation is."""
+"""Limit of all numbers of an annotation: pixels, degrees or lengths."""
 
 MOST_ID = 10**6
 FLAGS = ("truncated", "occluded", "difficult")
@@ -29,9 +29,9 @@ COARSE = ("azimuth_coarse", "elevation_coarse")
 
 @dataclass(frozen=True)
 class Seen:
-    """An object of a record: that file, and its place there from 1 on; its half-open box; the number from 1 on of its CAD
-    model, 0 if it has none; what is said of its viewpoint, as far as it has one; flags; anchors, each with its place, None
-    where it has none, and its status; and, of viewsphere's own, its id and RT (3, 4), None elsewhere.
+    """An object of a record: the record's file, and its place there from 1; its half-open box; the number of its CAD model
+    from 1, 0 without one; the given values of its viewpoint; flags; anchors, each with its position (None if unknown) and its
+    status. In viewsphere's own files also its id and RT (3, 4), None elsewhere.
     """
 
     file: Path
@@ -47,14 +47,14 @@ class Seen:
 
     @property
     def is_fine(self) -> bool:
-        """Return whether its viewpoint is more than a coarse one."""
+        """Return whether the object's viewpoint is more than a coarse one."""
         return self.view.get("distance", 0.0) > 0
 
 
 @dataclass(frozen=True)
 class Record:
-    """A picture's objects, the problems of others, and, of viewsphere's own, K (3, 3) of pixels from the picture's corner. The
-    name of its file and its size (width, height), None where nothing is said of these.
+    """A picture's objects, the problems of invalid ones, and, in viewsphere's own files, K (3, 3) in pixels from the picture's
+    corner. Its file's name and its size (width, height) are None if not given.
     """
 
     objects: Sequence[Seen]
@@ -65,7 +65,7 @@ class Record:
 
 
 def variables(file: Path) -> dict[str, Any]:
-    """The variables of a file; raises ValueError for what is no MATLAB file, StoreError for one that is too large."""
+    """The variables of a file. Raises ValueError for anything but a MATLAB file, StoreError for a file that is too large."""
     return read_mat(read_bytes(file, "MAX_ANNOTATION_BYTES"), limits.MAX_ANNOTATION_BYTES)
 
 
@@ -80,7 +80,7 @@ def structs_of(value: Any, what: str) -> Struct:
 
 
 def read_record(file: Path) -> Record:
-    """A picture's record; raises ValueError where there is none, or where it has too many objects."""
+    """A picture's record. Raises ValueError if there is none, or if it has too many objects."""
     found = variables(file)
     if "record" not in found:
         raise ValueError("expected a struct `record`; found none")
@@ -102,7 +102,7 @@ def read_record(file: Path) -> Record:
 
 
 def _size(value: Any) -> tuple[int, int] | None:
-    """The width and height that begin a record's size; None where there are none."""
+    """The width and height at the start of a record's size; None if there are none."""
     if _is_nothing(value):
         return None
     if not isinstance(value, np.ndarray) or value.size < 2:
@@ -149,7 +149,7 @@ def _numbers(value: Any, name: str, count: int) -> Float:
 
 
 def _whole(said: Mapping[str, Any], name: str, most: int) -> int | None:
-    """A whole number from 0 on, None where it is missing."""
+    """A whole number of at least 0; None if it is missing."""
     if _is_nothing(said.get(name)):
         return None
     number = float(_numbers(said[name], name, 1)[0])
@@ -159,7 +159,7 @@ def _whole(said: Mapping[str, Any], name: str, most: int) -> int | None:
 
 
 def _view(value: Any) -> dict[str, float]:
-    """Return the numbers of a viewpoint by name; empty where there is no viewpoint."""
+    """Return the numbers of a viewpoint by name; empty without a viewpoint."""
     rows = structs_of(np.zeros(0) if value is None else value, "a struct `viewpoint`")
     if not rows:
         return {}
@@ -184,7 +184,7 @@ def _anchors(value: Any) -> dict[str, tuple[tuple[float, float] | None, int]]:
 
 
 def _lens(value: Any) -> Float:
-    """K whose origin is the picture's corner, of one whose first pixel's centre is (1, 1)."""
+    """K with the picture's corner as origin, from a K with the first pixel's centre at (1, 1)."""
     k = _numbers(value, "record.K", 9).reshape(3, 3, order="F").copy()
     if not (k[0, 0] > 0 and k[1, 1] > 0 and k[1, 0] == 0 and (k[2] == (0, 0, 1)).all()):
         raise ValueError("expected record.K of a pinhole; found another")

@@ -22,7 +22,7 @@ CLASSES = (
     "aeroplane", "bicycle", "bird", "boat", "bottle", "bus", "car", "cat", "chair", "cow", "diningtable", "dog", "horse",
     "motorbike", "person", "pottedplant", "sheep", "sofa", "train", "tvmonitor",
 )  # fmt: skip
-"""PASCAL VOC's categories, from number 1 on."""
+"""PASCAL VOC's categories, numbered from 1."""
 
 
 class Pascal3d(Tree):
@@ -59,7 +59,7 @@ class Pascal3d(Tree):
         yield File(f"{KIT}/SegmentationObject/{name}.png", _indexed(sample, "objects", objects))
 
     def rest(self) -> Iterator[File]:
-        """The models, and the names of the numbers."""
+        """The models, and the names of the category numbers."""
         for category, infos in self._cads.by_category.items():
             if infos:
                 yield File(f"CAD/{category}.mat", self._cads.file(category))

@@ -1,4 +1,4 @@
-"""Cameras, rigs and some points of the worlds that they see, for formats that know little else."""
+"""Cameras, rigs and some points of the worlds that they see, for formats that store little else."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ from viewsphere.store import Dataset
 
 Float = NDArray[np.float64]
 MOST = 65535
-"""Steps of depth that 16 bits hold."""
+"""Number of depth steps in 16 bits."""
 
 POINTS = 500
-"""Points that are taken of a picture, about."""
+"""Approximate number of points taken from a picture."""
 
 
 def world_of(dataset: Dataset, sample: Sample) -> str:
-    """The name of what stands still while it is looked at from several sides: a sequence, a scene or a model."""
+    """The name of the static world that several cameras show: a sequence, a scene or a model."""
     if sample.sequence:
         return sample.sequence
     row = dataset.plan.row_at(sample.index)
@@ -35,22 +35,22 @@ def world_of(dataset: Dataset, sample: Sample) -> str:
 
 
 def world_from_camera(camera: Camera) -> Float:
-    """The camera's pose, (4, 4), of OpenCV's axes."""
+    """The camera's pose, (4, 4), with OpenCV's axes."""
     pose = np.eye(4)
     pose[:3, :3], pose[:3, 3] = camera.R.T, camera.center
     return pose
 
 
 def opengl_pose(camera: Camera) -> Float:
-    """The camera's pose, (4, 4), of OpenGL's axes: x right, y up, z back."""
+    """The camera's pose, (4, 4), with OpenGL's axes: x right, y up, z back."""
     return world_from_camera(camera) * (1.0, -1.0, -1.0, 1.0)
 
 
 @dataclass(frozen=True, eq=False)
 class Moment:
-    """A rig when it takes a sample: names, lenses and `rig_from_sensor`, (4, 4), of its sensors, which of these the sample is
-    of, those of which there are samples, the number of the first of all, and the rig's own pose, as that of a camera. `folder`
-    is where files of several sensors are told apart, empty where there is one.
+    """A rig at the instant of a sample: names, lenses and `rig_from_sensor`, (4, 4), of its sensors; the sample's sensor; the
+    sensors with samples; the number of the first sample; and the rig's pose, as a camera pose. `folder` separates the files of
+    several sensors and is empty for a single one.
     """
 
     names: tuple[str, ...]
@@ -64,19 +64,19 @@ class Moment:
 
     @property
     def is_first(self) -> bool:
-        """Return whether the sample is the first that there is of its moment."""
+        """Return whether the sample is the first one of its moment."""
         return self.sensor == self.there[0]
 
 
 class Rigs:
-    """The rigs that take a data set's samples."""
+    """The rigs of a data set's samples."""
 
     def __init__(self, dataset: Dataset) -> None:
         self._dataset = dataset
         self._shot = lru_cache(maxsize=8)(dataset.labelled)
 
     def usual(self, part: int) -> Rig | None:
-        """That of the first shot of a part of the data set."""
+        """The rig of the first shot of a part of the data set."""
         return self._usual.get(part)
 
     @property
@@ -88,7 +88,7 @@ class Rigs:
         return self._found
 
     def at(self, sample: Sample) -> Moment:
-        """The rig that takes a sample, then; of one whose shot nobody knows, its camera alone."""
+        """The rig at the instant of a sample; only the sample's camera if its shot is unknown."""
         taken = sample.origin
         shot = taken.shot or self._shot(taken.key) if taken else None
         if taken is None or shot is None:
@@ -109,7 +109,9 @@ class Rigs:
 
 
 def measured_png(sample: Sample, metres: float) -> Coded:
-    """Depth along z in steps of so many metres, 16 bits, as RGB-D cameras measure it: 0 where nothing is, or it is too far."""
+    """Depth along z in steps of this many metres, 16 bits, as in RGB-D cameras: 0 for no surface or a depth beyond the
+    range.
+    """
 
     def make() -> bytes:
         depth = sample.channels["depth"].astype(np.float64)
@@ -123,7 +125,7 @@ def measured_png(sample: Sample, metres: float) -> Coded:
 
 @dataclass(frozen=True, eq=False)
 class Points:
-    """Points of a picture: their pixels (N, 2), their places in the world (N, 3), metres, and their colours (N, 3) uint8."""
+    """Points of a picture: their pixels (N, 2), their positions in the world (N, 3), metres, and their colours (N, 3) uint8."""
 
     pixels: Float
     world: Float

@@ -1,4 +1,4 @@
-"""An exported JSON file beside the one that would be exported now."""
+"""The comparison of an exported JSON file with a new export."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from viewsphere.formats.shared.writing.export_files import same_bytes
 from viewsphere.plugins.format import Remark
 
 ABSENT: Final = object()
-"""In the place of a value that one of two files lacks."""
+"""The placeholder for a value that one of two files lacks."""
 
 MOST_SHOWN = 3
-"""Differences of one row that are named."""
+"""Number of differences to name for one row."""
 
 
 def check_json(
@@ -24,7 +24,7 @@ def check_json(
 ) -> Iterator[Remark]:
     """Yield the rows (see `rows`) of the file `found` that differ from `wanted`; `frame_of` returns the frame of a row.
 
-    Equal files are read only as bytes. For other files, memory holds only the rows that have changed places.
+    Equal files are read only as bytes. For other files, only the rows that have moved are held in memory.
     """
     if not found.is_file() or same_bytes(wanted, found):
         return
@@ -43,8 +43,8 @@ def check_json(
 
 
 def _differing(wanted: Iterator[Row], found: Iterator[Row]) -> Iterator[tuple[Where, Any, Any]]:
-    """Keys of the rows that differ and both values, in whatever order the rows come; ABSENT for a row that is not there."""
-    waiting: tuple[dict[Where, Any], dict[Where, Any]] = {}, {}  # rows that have not met their like yet
+    """Keys of the rows that differ with both values, in any order of rows; ABSENT for a missing row."""
+    waiting: tuple[dict[Where, Any], dict[Where, Any]] = {}, {}  # rows without a match so far
     sides = {0: wanted, 1: found}
     while sides:
         for side, row in [(side, next(it, None)) for side, it in sides.items()]:
@@ -63,7 +63,7 @@ def _differing(wanted: Iterator[Row], found: Iterator[Row]) -> Iterator[tuple[Wh
 
 
 def _changes(wanted: Any, found: Any, where: str = "") -> Iterator[str]:
-    """Every leaf that is not as wanted; Python takes True for 1, JSON does not."""
+    """Yield every leaf that differs. True and 1 are equal in Python but not in JSON."""
     if isinstance(wanted, dict) and isinstance(found, dict):
         one, other = cast(dict[str, Any], wanted), cast(dict[str, Any], found)
         for key in dict.fromkeys((*one, *other)):

@@ -1,4 +1,4 @@
-"""Reads JSON files of any size row by row; the format says which values are rows."""
+"""Reads JSON files of any size row by row; the format defines which values are rows."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ LONGEST = 1 << 24
 """Fewest characters read at once (`BLOCK`), and most characters of a row (`LONGEST`)."""
 
 LONGEST_NUMBER = 32
-"""Characters that must be known behind a number to be sure that the number has ended."""
+"""Number of characters to read after a number to be sure that it has ended."""
 
 Where = tuple[str, ...]
 """Keys from the top of a file to a value in it; the key of a list's item is the item's `id`, or else its index."""
@@ -26,7 +26,7 @@ def rows(file: Path, opened: Collection[Where]) -> Iterator[Row]:
     """The values of a JSON file and their keys; objects and lists whose keys are in `opened` ("*" is any key) are replaced by
     their items.
 
-    Raises ValueError for a file that is no JSON, OSError where the file cannot be read.
+    Raises ValueError for an invalid JSON file, OSError for an unreadable file.
     """
     with open_text(file, newline="") as text:
         reader = _Reader(text)
@@ -62,7 +62,7 @@ def _items(where: Where, reader: _Reader, opened: Collection[Where], *, named: b
 
 
 class _Reader:
-    """Reads values from the unread rest of a text; no more of the text is held than the next value needs."""
+    """A reader of values from the rest of a text, which holds only as much text as the next value needs."""
 
     def __init__(self, text: IO[str]) -> None:
         self._text = text
@@ -70,7 +70,7 @@ class _Reader:
         self._decoder = json.JSONDecoder()
 
     def peek(self) -> str:
-        """The next character that is no white space; raises ValueError at the end of the text."""
+        """The next character other than white space; raises ValueError at the end of the text."""
         while True:
             while self._at < len(self._buffer) and self._buffer[self._at] in " \t\n\r":
                 self._at += 1
@@ -80,14 +80,14 @@ class _Reader:
                 raise ValueError("expected more JSON, found the file's end: it is cut off")
 
     def take(self, character: str) -> None:
-        """Go past the next character, which has to be this one."""
+        """Skip the next character, which must be this one."""
         found = self.peek()
         if found != character:
             raise ValueError(f"character {self._gone + self._at:,}: expected {character!r}, found {found!r}")
         self._at += 1
 
     def value(self) -> Any:
-        """The next value, whole."""
+        """The next complete value."""
         self.peek()
         while True:
             try:
@@ -100,7 +100,7 @@ class _Reader:
                     raise ValueError(f"character {self._gone + error.pos:,}: {error.msg}") from None
 
     def end(self) -> None:
-        """Raises ValueError where anything but white space is left."""
+        """Check the end of the text. Raises ValueError if anything but white space is left."""
         try:
             found = self.peek()
         except ValueError:

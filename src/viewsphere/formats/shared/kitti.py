@@ -20,7 +20,7 @@ from viewsphere.model.shot import Shot
 
 
 class Car(NamedTuple):
-    """The sensors of a rig by their places in it: the camera that counts, its partner to the right, and the LiDAR."""
+    """The sensors of a rig by their places in it: the reference camera, its partner to the right, and the LiDAR."""
 
     left: int
     right: int | None = None
@@ -28,7 +28,7 @@ class Car(NamedTuple):
 
 
 def car_of(rig: Rig) -> Car | None:
-    """The rig as a car of KITTI's; None for one with other sensors than a camera or a rectified pair, and a LiDAR at most."""
+    """The rig as KITTI's car; None for a rig with sensors other than a camera or a rectified pair, and at most one LiDAR."""
     cameras = [i for i, sensor in enumerate(rig.sensors) if sensor.lidar is None]
     lidars = [i for i, sensor in enumerate(rig.sensors) if sensor.lidar is not None]
     pairs = [pair for pair in rig.rectified if {pair.left, pair.right} <= set(cameras)]
@@ -39,7 +39,7 @@ def car_of(rig: Rig) -> Car | None:
 
 
 def other_cars(scope: Scope) -> Iterator[str]:
-    """Yield the reasons why a data set's rig is no car of KITTI's, or has none of its points."""
+    """Yield the reasons why a data set's rig differs from KITTI's car, or lacks its points."""
     yield from pointless(scope)
     if scope.rig is not None and car_of(scope.rig) is None:
         found = ", ".join(sensor.name for sensor in scope.rig.sensors)
@@ -47,7 +47,7 @@ def other_cars(scope: Scope) -> Iterator[str]:
 
 
 def car_in(shot: Shot, name: str) -> Car:
-    """The rig of a shot as a car; raises UserError, with the format's name, for any other."""
+    """The rig of a shot as KITTI's car. Raises UserError, with the format's name, for any other rig."""
     car = car_of(shot.rig)
     if car is None:
         raise UserError(
@@ -57,9 +57,9 @@ def car_in(shot: Shot, name: str) -> Car:
 
 
 def calibration(rig: Rig, car: Car, intrinsics: Intrinsics) -> Mapping[str, Float]:
-    """The four projections (3, 4), whose pixel (0, 0) is the centre of the first one, and `velo` (3, 4), from the LiDAR's axes
-    to those of the left camera. The grey cameras, 0 and 1, stand where the coloured ones, 2 and 3, do; a right one that is not
-    there, where the left one is. `intrinsics`: the left camera's lens then.
+    """The four projections (3, 4), with the centre of the first pixel at (0, 0), and `velo` (3, 4), from the LiDAR's axes to
+    the left camera's. The grey cameras 0 and 1 are at the colour cameras 2 and 3; a missing right camera is at the left one.
+    `intrinsics`: the left camera's lens at that instant.
     """
     left, right = mounted(rig, car.left), mounted(rig, car.left if car.right is None else car.right)
     velo = CAMERA_FROM_LIDAR
@@ -70,7 +70,9 @@ def calibration(rig: Rig, car: Car, intrinsics: Intrinsics) -> Mapping[str, Floa
 
 
 def projection(lens: Intrinsics, along: float = 0.0) -> Float:
-    """The matrix (3, 4) from a camera's axes to the pixels, (0, 0) a centre, of one with its lens so far along its x axis."""
+    """The matrix (3, 4) from a camera's axes to the pixels (with (0, 0) a centre) of a camera with this lens, shifted along
+    its x axis.
+    """
     return product(centred(lens.K), [[1, 0, 0, -along], [0, 1, 0, 0], [0, 0, 1, 0]])
 
 
@@ -80,19 +82,19 @@ def _along(left: Float, right: Float) -> float:
 
 
 def printed(values: Float) -> str:
-    """Numbers as KITTI's calibrations have them, row by row, with enough digits to be read back almost equal."""
+    """Numbers in the style of KITTI's calibrations, row by row, with enough digits to be read back almost equal."""
     return " ".join(f"{value:.12e}" for value in (np.asarray(values) + 0.0).ravel())
 
 
 def calibration_text(calibrated: Mapping[str, Float], *others: tuple[str, Float]) -> bytes:
-    """Lines of the four projections, and of other matrices, each with the word that its line begins with."""
+    """Lines of the four projections and of other matrices, each starting with its key."""
     projections = ((f"{name}:", calibrated[name]) for name in ("P0", "P1", "P2", "P3"))
     return "".join(f"{name} {printed(matrix)}\n" for name, matrix in (*projections, *others)).encode()
 
 
 def rectified(sample: Sample, baseline: float) -> bytes:
-    """The lines of calib_cam_to_cam.txt of the colour cameras, 02 and, where the baseline is not 0, 03; the sample is the left
-    one's.
+    """The lines of calib_cam_to_cam.txt for the colour cameras, 02 and, if the baseline is not 0, 03. The sample is the left
+    camera's.
     """
     eyes = {"02": 0.0, "03": baseline} if baseline else {"02": 0.0}
     size = f"{sample.width} {sample.height}"
@@ -111,7 +113,7 @@ NO_ANGLE, NO_SHARE = -10.0, -1
 """The placeholders for unknown values of imported objects."""
 
 DONT_CARE = "dont_care"
-"""The name in an imported picture's `source` of the boxes, half-open corners, of regions that evaluations leave out."""
+"""The key in an imported picture's `source` for the boxes (half-open corners) of regions that evaluations leave out."""
 
 
 def nobody_cares(region: Box) -> str:
@@ -121,7 +123,7 @@ def nobody_cares(region: Box) -> str:
 
 
 def row(o: ObjectAnnotation, kind: str, in_grades: bool) -> str:
-    """A line of labels, without its end: of an object of this type, whose truncation is its share, or its grade."""
+    """A line of labels, without its end, for an object of this type; its truncation is a share or a grade."""
     assert o.box2d is not None
     alpha, box = upright(o) if o.is_boxed else (NO_ANGLE, NO_BOX)
     alpha = (o.source or {}).get("alpha", alpha)
@@ -130,8 +132,8 @@ def row(o: ObjectAnnotation, kind: str, in_grades: bool) -> str:
 
 
 def _outside(o: ObjectAnnotation, in_grades: bool) -> float:
-    """Return the part of an object outside of the picture, as a share or a grade. Imported objects may have only one of them,
-    or neither.
+    """Return the part of an object outside the picture, as a share or a grade. Imported objects may have only one of them, or
+    neither.
     """
     if in_grades and "truncation_level" in o.extra:
         return int(o.extra["truncation_level"])
@@ -141,7 +143,7 @@ def _outside(o: ObjectAnnotation, in_grades: bool) -> float:
 
 
 def _hidden(o: ObjectAnnotation) -> int:
-    """KITTI's grade of occlusion, of merged objects too, of which no more than the shares is kept."""
+    """KITTI's grade of occlusion, also for merged objects, for which only the shares are stored."""
     if "occlusion_level" in o.extra:
         return int(o.extra["occlusion_level"])
     if math.isnan(o.visibility) or o.truncation >= 1:
@@ -158,7 +160,7 @@ def inclusive(box: Box) -> Box:
 
 def upright(o: ObjectAnnotation) -> tuple[float, tuple[float, ...]]:
     """alpha; and height, width, length, x, y, z (metres, camera axes, the middle of the bottom) and rotation_y (radians) of
-    the object's box as it stands upright in the camera's axes, around the same middle.
+    the object's box, set upright in the camera's axes around the same middle.
     """
     width, height, length = o.size
     x, y, z = o.box3d_camera.mean(axis=0).tolist()

@@ -17,11 +17,11 @@ from viewsphere.model.sensors.rig import Rig
 Float = NDArray[np.float64]
 
 CAMERA_FROM_LIDAR = np.array([[0.0, -1, 0, 0], [0, 0, -1, 0], [1, 0, 0, 0], [0, 0, 0, 1]])
-"""From a LiDAR's axes (x ahead, y left, z up) to those of a camera that stands and looks as it does."""
+"""The rotation from a LiDAR's axes (x ahead, y left, z up) to those of a camera with the same position and direction."""
 
 
 def mounted(rig: Rig, sensor: int) -> Float:
-    """The rigid matrix (4, 4) from the axes of a sensor, by its place in the rig, to those of the first; OpenCV axes."""
+    """The rigid matrix (4, 4) from the axes of a sensor, by its place in the rig, to the first sensor's axes; OpenCV axes."""
     return np.array(rig.sensors[sensor].rig_from_sensor, np.float64)
 
 
@@ -32,14 +32,14 @@ def unmoved(matrix: Float) -> Float:
 
 
 def centred(matrix: Float) -> Float:
-    """A camera matrix K (3, 3) whose origin is the centre of the first pixel, of one whose origin is the picture's corner."""
+    """A camera matrix K (3, 3) with the centre of the first pixel as origin, from a K with the picture's corner as origin."""
     moved = np.array(matrix)
     moved[:2, 2] -= 0.5
     return moved
 
 
 def pointless(scope: Scope) -> Iterator[str]:
-    """Of a format of points: LiDARs that keep none."""
+    """Reasons to refuse, for a format of points: LiDARs that store none."""
     for sensor in scope.rig.sensors if scope.rig else ():
         if sensor.lidar is not None and LIDAR not in sensor.kept(scope.channels):
             yield f"expected channel {LIDAR} of every LiDAR; found none of {sensor.name}"

@@ -1,7 +1,7 @@
-"""MATLAB files of PASCAL3D+ and ObjectNet3D: what a picture shows and from where, and the CAD models that it shows.
+"""MATLAB files of PASCAL3D+ and ObjectNet3D: a picture's objects and viewpoints, and the CAD models that it shows.
 
-Pixels are MATLAB's: the centre of the first pixel is (1, 1), so that half a pixel is added to ours. A model's origin is the
-centre of its box.
+Pixels are MATLAB's: the centre of the first pixel is (1, 1), so half a pixel is added to viewsphere's pixels. A model's origin
+is the centre of its box.
 """
 
 from __future__ import annotations
@@ -26,22 +26,22 @@ from viewsphere.model.sensors.camera import Intrinsics
 from viewsphere.store import Dataset, ModelInfo
 
 NAMES = r"[A-Za-z][A-Za-z0-9_]{0,62}"
-"""Of variables and fields in MATLAB."""
+"""Allowed names of variables and fields in MATLAB."""
 
 KIT = "PASCAL/VOCdevkit/VOC2012"
 """The folder in which PASCAL3D+ keeps its files from PASCAL VOC."""
 
 OWN = ("vertices", "faces", "pnames")
-"""Fields of a CAD model that are no points."""
+"""Fields of a CAD model other than points."""
 
 HEAD = b"MATLAB 5.0 MAT-file Platform: posix, Created by: viewsphere"
 HEAD_BYTES = 116
 
 STATUS = {0: 1, 1: 2, 2: 4, 3: 4}
-"""Of anchors by the states of keypoints: visible, occluded, outside, behind."""
+"""Statuses of anchors by the states of keypoints: visible, occluded, outside, behind."""
 
 TRUNCATED, OCCLUDED = 0.15, 0.05
-"""Shares above which an object is so, as the annotators of PASCAL VOC were told."""
+"""Shares above which an object is truncated or occluded, by PASCAL VOC's annotation guidelines."""
 
 HALF_PIXEL = np.array([[0.0, 0, 0.5], [0, 0, 0.5], [0, 0, 0]])
 
@@ -56,8 +56,8 @@ class Options(Frozen):
 
 
 def no_viewpoints(scope: Scope) -> Iterator[str]:
-    """Viewpoints that nobody knows, but for those of other trees of the kind, which may have some alone; those of other cameras
-    than pinholes with square pixels, and names that are none in MATLAB.
+    """Reasons to refuse: unknown viewpoints, except in imported trees of this kind, which may have only some; cameras other
+    than pinholes with square pixels; and names that MATLAB does not allow.
     """
     shown = [sample.known_camera is not None and o.is_placed for sample in scope.pictures for o in sample.objects]
     if shown and not any(shown) and "keypoints" not in scope.annotations:
@@ -76,8 +76,7 @@ def _oblong(lens: Intrinsics) -> str:
 
 
 def scipy_io(name: str) -> Any:
-    """Return the module that writes .mat files; raises MissingExtraError, for a format of this name, where it is not
-    installed.
+    """Return the module that writes .mat files. Raises MissingExtraError, with the format's name, if it is not installed.
     """
     try:
         from scipy import io
@@ -87,7 +86,7 @@ def scipy_io(name: str) -> Any:
 
 
 def mat(**variables: Any) -> bytes:
-    """A MATLAB 5 file of these variables, of equal bytes at all times."""
+    """A MATLAB 5 file of these variables, always with the same bytes."""
     file = BytesIO()
     scipy_io("mat").savemat(file, variables, long_field_names=True, oned_as="row")
     data = file.getvalue()
@@ -110,14 +109,14 @@ def nothing() -> NDArray[np.float64]:
 
 
 def box(o: ObjectAnnotation) -> NDArray[np.float64]:
-    """Its first and last pixels, counted from 1: x1, y1, x2, y2."""
+    """A box's first and last pixels, counted from 1: x1, y1, x2, y2."""
     assert o.box2d is not None
     x0, y0, x1, y1 = o.box2d
     return np.array([[math.floor(x0) + 1, math.floor(y0) + 1, math.ceil(x1), math.ceil(y1)]], np.float64)
 
 
 class Cads:
-    """The models of a data set by their categories, and the names of their points as MATLAB has them."""
+    """The models of a data set by their categories, and their points' names in MATLAB's form."""
 
     def __init__(self, dataset: Dataset, options: Options, name: str) -> None:
         self._dataset = dataset
@@ -132,7 +131,9 @@ class Cads:
         }
 
     def record(self, sample: Sample, objects: Iterable[ObjectAnnotation], filename: str, *, masks: bool) -> bytes:
-        """The file of a picture. Raises UserError for a lens that is no pinhole with square pixels, as of merged data sets."""
+        """The file of a picture. Raises UserError for a lens other than a pinhole with square pixels, as merged data sets may
+        have.
+        """
         lens = sample.known_camera and sample.known_camera.intrinsics
         if lens and (not lens.lens.is_linear or _oblong(lens)):
             found = _oblong(lens) or "a lens that distorts"
@@ -167,7 +168,7 @@ class Cads:
         }
 
     def _anchors(self, o: ObjectAnnotation) -> dict[str, dict[str, Any]]:
-        """Anchors by their names; those that are not visible have no place, but for imported ones."""
+        """Anchors by their names; invisible ones have no position, unless they are imported."""
         fields, said = self._fields[o.category], o.source
         if not self._has_anchors or (not fields if said is None else "keypoint_names" not in o.extra):
             return {}
@@ -186,7 +187,7 @@ class Cads:
         return mat(**{category: self.structs(category)})
 
     def structs(self, category: str, *, has_points: bool = True) -> NDArray[Any]:
-        """The models of a category as MATLAB has them."""
+        """The models of a category as a MATLAB struct array."""
         fields = self._fields[category] if has_points else {}
         rows: list[dict[str, Any]] = []
         for info in self.by_category[category]:
@@ -207,7 +208,7 @@ class Cads:
         return mat(cads=cells, class_names=names)
 
     def points(self, info: ModelInfo) -> Iterator[tuple[str, bytes]]:
-        """Each named point of a model, as MATLAB has its name, and as OFF text."""
+        """Each named point of a model: its name in MATLAB's form, and its OFF text."""
         for name, place in info.keypoints.points.items() if info.keypoints else ():
             x, y, z = (np.array(place) - info.box3d_object.mean(axis=0)).tolist()
             yield self._fields[info.category][name], f"OFF\n1 0 0\n{x!r} {y!r} {z!r}\n".encode()
@@ -231,14 +232,14 @@ def off_bytes(vertices: NDArray[np.float64], triangles: NDArray[np.int32]) -> by
 
 
 def _camera_from_cad(o: ObjectAnnotation) -> NDArray[np.float64]:
-    """From the axes of an object's CAD model to those of the camera, (3, 4); of an unknown model, whose origin is its own."""
+    """The motion (3, 4) from the axes of an object's CAD model to the camera's; an unknown model has its own origin."""
     motion = o.camera_from_object[:3].copy()
     motion[:, 3] = transform(motion, np.nan_to_num(o.box3d_object.mean(axis=0)))
     return motion
 
 
 def _said(source: Mapping[str, Any], anchors: int) -> Any:
-    """The viewpoint of an imported object whose place is not known, as it was; [] without any."""
+    """The unchanged viewpoint of an imported object with an unknown position; [] without a viewpoint."""
     known = source.get("viewpoint")
     return {**known, "num_anchor": float(anchors)} if known else nothing()
 
@@ -266,7 +267,7 @@ def _viewpoint(o: ObjectAnnotation, sample: Sample, place: NDArray[np.float64], 
 
 
 def _fields(infos: Iterable[ModelInfo], where: str) -> dict[str, str]:
-    """Fields of MATLAB by the names of points; raises UserError where two names have one."""
+    """Fields of MATLAB by the names of points; raises UserError if two names share a field."""
     names = dict.fromkeys(name for info in infos if info.keypoints for name in info.keypoints.points)
     found = dict[str, str]()
     for name in names:

@@ -53,18 +53,20 @@ from viewsphere.plugins.format import FormatSpec
 
 
 def check() -> None:
-    """Raise MissingExtraError where there is no scipy, or no ffmpeg."""
+    """Raise MissingExtraError if scipy or ffmpeg is missing."""
     scipy_io("surreal")
     film_encoder()
 
 
 def needs() -> tuple[str, ...]:
-    """The joints."""
+    """The required labels: the joints."""
     return ("keypoints",)
 
 
 def refuses(scope: Scope) -> Iterator[str]:
-    """Yield the reasons why a data set is not one person before one pinhole camera, and the sizes that videos cannot have."""
+    """Yield the reasons why a data set is not one person in front of one pinhole camera, and the sizes that videos cannot
+    have.
+    """
     yield from refusals.sequences(scope)
     yield from unknown_shots(scope)
     yield from refusals.one_sensor(scope)

@@ -1,4 +1,4 @@
-"""The joints of SURREAL's people, and what other rigs call them."""
+"""The joints of SURREAL's people, and their names in other rigs."""
 
 from __future__ import annotations
 
@@ -26,20 +26,20 @@ GAME_ENGINE: Naming = (
     "hand_l", "hand_r", "middle_01_l", "middle_01_r",
 )  # fmt: skip
 NAMINGS = (SMPL, MIXAMO, GAME_ENGINE)
-"""Of each rig the names of the 24 joints, in SURREAL's order, which is also that of its parts of the body."""
+"""The names of the 24 joints in each rig, in SURREAL's order, which its body parts also follow."""
 
 UNKNOWN = -1
-"""The number of a part that has no name of these."""
+"""The number of a part with none of these names."""
 
 MOST_TOLD = 4
-"""Names that a message lists."""
+"""Number of names to list in a message."""
 
 _PREFIX = re.compile(r"^(.*:|[mf]_avg_|mixamorig\d*_?)", re.IGNORECASE)
 _FINGER = re.compile(r"thumb|index|middle|ring|pinky")
 
 
 def joints(names: Sequence[str]) -> tuple[Naming, NDArray[np.intp]]:
-    """Return the naming of a person's joints, and the places of the 24 joints in `names`; raises ValueError with the missing
+    """Return the naming of a person's joints, and the indices of the 24 joints in `names`; raises ValueError with the missing
     joints.
     """
     places = {_plain(name): i for i, name in reversed([*enumerate(names)])}
@@ -51,9 +51,9 @@ def joints(names: Sequence[str]) -> tuple[Naming, NDArray[np.intp]]:
 
 
 def part_numbers(parts: Sequence[str], own: Naming) -> NDArray[np.int64]:
-    """SURREAL's number of each part of a body, 1 to 24, after that of none, 0; `UNKNOWN` for names that it has none for.
+    """SURREAL's number of each part of a body, 1 to 24, preceded by 0 for none; `UNKNOWN` for names without a number.
 
-    Names are taken for those of the rig that knows most of them; where several do, `own`.
+    The naming of the rig with most of these names applies; if several rigs tie, `own`.
     """
     plain = [_plain(name) for name in parts]
     tables = [{_plain(name): i for i, name in enumerate(naming, 1)} for naming in (own, *NAMINGS)]
@@ -66,7 +66,7 @@ def _plain(name: str) -> str:
 
 
 def _finger(name: str) -> int:
-    """The number of the end of the hand that a finger is of."""
+    """The number of the end of a finger's hand."""
     if not _FINGER.search(name):
         return UNKNOWN
     return SMPL.index("L_Hand" if name.startswith("l") or name.endswith("l") else "R_Hand") + 1

@@ -32,25 +32,26 @@ from viewsphere.store import Dataset
 Float = NDArray[np.float64]
 
 MOST = 100
-"""Pictures of a clip."""
+"""Greatest number of pictures in a clip."""
 
 NOTHING = 1e10
-"""Depth of what is infinitely far, as Blender has it."""
+"""Blender's depth of infinitely distant points."""
 
 RATE = 30.0
-"""Pictures a second of a clip that has only one."""
+"""Frame rate of a clip with only one picture."""
 
 CAMERA_FROM_WORLD = np.array([[0.0, 0, -1], [0, 1, 0], [-1, 0, 0]])
 """SURREAL's rotation, (3, 3): a mirror image, and its own inverse."""
 
 CLIPS, SEQUENCES = 4, 2
-"""Clips and sequences that are kept for the samples that follow."""
+"""Number of clips and sequences to keep for the following samples."""
 
 
 @dataclass(frozen=True, eq=False)
 class Clip:
-    """Some instants of a sequence: its path without an ending, its number from 1, the pictures, of each the places of the 24
-    joints among the person's points, and where the camera is in the clip's world, (3,) float32.
+    """Some instants of a sequence: the clip's path without an ending, its number from 1, and the pictures. Also, for each
+    picture, the indices of the 24 joints among the person's points, and the camera's position in the clip's world, (3,)
+    float32.
     """
 
     path: str
@@ -93,7 +94,7 @@ class Surreal(Tree):
             yield Piece(f"{clip.path}_{name}.mat", _variable(f"{name}_{k}", array.astype(kind)))
 
     def layout(self, path: str, counts: Mapping[str, int]) -> Layout:
-        """A MATLAB file's head, and its variables."""
+        """A MATLAB file's header, and its variables."""
         return (mat()[:HEAD], "")
 
     def rest(self) -> Iterator[File]:
@@ -112,7 +113,7 @@ class Surreal(Tree):
         return self._clip(scene(sample), sample.sensor, sample.instant // MOST)
 
     def _made(self, sequence: str, sensor: str, number: int) -> Clip:
-        """A clip; raises UserError for one that SURREAL cannot hold."""
+        """A clip. Raises UserError for a clip that SURREAL cannot hold."""
         samples = tuple(one for one in self._sequence(sequence, sensor) if one.instant // MOST == number)
         first = samples[0]
         for place, sample in enumerate(samples):
@@ -125,7 +126,7 @@ class Surreal(Tree):
         return Clip(path, number + 1, samples, tuple(own), place)
 
     def _strange(self, sample: Sample, first: Sample, place: int) -> str:
-        """Return the reason why SURREAL cannot hold a sample; empty where it can."""
+        """Return the reason why SURREAL cannot hold a sample; empty if it can."""
         now, then, start = sample.camera, first.camera, first.instant - first.instant % MOST
         if sample.instant != start + place:
             return f"all instants of a clip from {start} on; found {sample.instant} in place of {start + place}"
@@ -151,7 +152,7 @@ class Surreal(Tree):
         return places
 
     def _parts(self, sample: Sample) -> NDArray[np.int64]:
-        """SURREAL's number of the part that each pixel shows, (H, W); raises UserError for parts that it does not know."""
+        """SURREAL's number of the part that each pixel shows, (H, W); raises UserError for parts that SURREAL lacks."""
         o = _person(sample)
         names = self._models[o.key].body_parts
         numbers = part_numbers(names, joints(o.keypoint_names)[0])
@@ -184,19 +185,19 @@ class Surreal(Tree):
         }
 
     def _background(self, sample: Sample) -> str:
-        """The name of the picture behind a sample's scene, without its folder; empty where there is none."""
+        """The name of the picture behind a sample's scene, without its folder; empty if there is none."""
         shot, instant, _ = self._timeline.taken(sample)
         finish = shot.instants[instant].finish or shot.scene.finish
         return PurePath(finish.background.image or "").name
 
 
 def film_encoder() -> Encoder:
-    """Return the video encoder; raises MissingExtraError where there is no ffmpeg."""
+    """Return the video encoder; raises MissingExtraError if ffmpeg is missing."""
     return encoder("format surreal", "")
 
 
 def _film(clip: Clip) -> bytes:
-    """The video of a clip; no picture stays in memory, as it would with a sample that has read it."""
+    """The video of a clip. It reads copies of the samples, so that no picture stays in memory."""
     times = [sample.time for sample in clip.samples]
     steps: Sequence[float] = np.diff(times).tolist() or [1 / RATE]
     lasts = [*steps, min(steps)][: len(times)]
@@ -207,13 +208,13 @@ def _film(clip: Clip) -> bytes:
 
 
 def _variable(name: str, array: NDArray[Any]) -> bytes:
-    """A variable as it stands in a MATLAB file, deflated."""
+    """A variable as stored in a MATLAB file, compressed with deflate."""
     data = compressed(np.frombuffer(mat(**{name: array})[HEAD:], np.uint8))
     return struct.pack("<II", COMPRESSED, len(data)) + data
 
 
 def _projected(K: Float, away: Float) -> Float:
-    """Pixels (2, 24, T) of places (3, 24, T) in the clip's world, from where the camera is."""
+    """Pixels (2, 24, T) of positions (3, 24, T) in the clip's world, seen by the clip's camera."""
     found = np.einsum("ij,jkt->ikt", K @ CAMERA_FROM_WORLD, away)
     return found[:2] / found[2]
 
@@ -224,6 +225,8 @@ def _person(sample: Sample) -> ObjectAnnotation:
 
 
 def _turn(sample: Sample) -> float:
-    """Radians from the way to the camera to that of the model's front, -Y, counter-clockwise seen from above."""
+    """Angle from the direction to the camera to the direction of the model's front (-Y), radians, counter-clockwise seen from
+    above.
+    """
     right, front = sample.camera.R[0, :2], -_person(sample).world_from_object[:2, 1]
     return float(np.arctan2(right @ front, right[1] * front[0] - right[0] * front[1]))

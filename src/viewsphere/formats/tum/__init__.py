@@ -45,7 +45,7 @@ from viewsphere.plugins.format import FormatSpec
 from viewsphere.store import Dataset
 
 STEP = 1 / 5000
-"""Metres of a step of depth."""
+"""Size of a depth step, metres."""
 
 HEADS = {
     "rgb.txt": "# color images\n# timestamp filename\n",
@@ -54,7 +54,7 @@ HEADS = {
     "calibration.txt": "# fx fy cx cy k1 k2 p1 p2 k3\n",
 }
 MOST = 5
-"""Coefficients of a lens."""
+"""Greatest number of a lens' coefficients."""
 
 
 class Options(Frozen):
@@ -66,7 +66,7 @@ class Options(Frozen):
 
 
 def refuses(scope: Scope, options: Options) -> Iterator[str]:
-    """Lenses that a line of numbers does not hold."""
+    """Reasons to refuse: lenses that a line of numbers cannot hold."""
     yield from known_cameras(scope)
     yield from no_skew(scope)
     if options.kind == "icl-nuim":
@@ -85,7 +85,7 @@ class Tum(Tree):
         self._rigs = Rigs(dataset)
 
     def of(self, sample: Sample) -> Iterator[File | Piece]:
-        """A picture, its depth, where it was taken, and lines that name them."""
+        """A picture, its depth, its pose, and the lines that name them."""
         lens, now, world = sample.camera.intrinsics, self._rigs.at(sample), world_of(self.dataset, sample)
         if lens.skew or not _is_held(lens):
             raise UserError(f"tum: frame {sample.index}: expected a lens of k1 k2 p1 p2 k3; found another")
@@ -114,7 +114,7 @@ class Tum(Tree):
             yield line(f"{folder}/depth.txt", *depth)
 
     def layout(self, path: str, counts: Mapping[str, int]) -> Layout:
-        """The head that TUM's files have, and the lines; the lens is the name of its section."""
+        """The header of TUM's files, and the lines; the lens is the name of its section."""
         name = path.rpartition("/")[2]
         head = HEADS.get(name, "").encode()
         if name != "calibration.txt":
@@ -136,7 +136,7 @@ def _numbers(lens: Intrinsics, up: int) -> str:
 
 
 def _mirrored(pose: NDArray[np.float64]) -> NDArray[np.float64]:
-    """A camera's pose, (4, 4), with y up in the camera and in the world, both of which are left-handed then."""
+    """A camera's pose, (4, 4), with y up in the camera and in the world, so that both are left-handed."""
     return pose[[0, 2, 1, 3]] * (1.0, -1.0, 1.0, 1.0)
 
 

@@ -24,19 +24,19 @@ APART = 0.02
 """Seconds by which a picture, its depth and its pose may differ, as in TUM's own tool."""
 
 STEP = 1 / 5000
-"""Metres of a step of depth."""
+"""Size of a depth step, metres."""
 
 Timed = tuple[float, list[str]]
-"""Seconds, and the words behind them."""
+"""A time in seconds, and the words after it."""
 
 
 def read(path: Path, *, keep_going: bool = False) -> ForeignDataset:
     """The pictures of one sensor's folder, as a sequence, each with the depth and the pose that are nearest in time.
 
-    The lens is that of `calibration.txt`, a line of fx fy cx cy [k1 k2 p1 p2 [k3]], pixels from the middle of the first, which
-    TUM's and ICL-NUIM's own folders lack. Where its fy is negative, the world is mirrored, as ICL-NUIM's, and is turned back.
-    Pictures without a pose or a depth in the 0.02 s around are left out, as TUM's tool does; there are no objects. Raises
-    StoreError for what cannot be read; with `keep_going` such pictures are left out and reported.
+    The lens is that of `calibration.txt`, a line of fx fy cx cy [k1 k2 p1 p2 [k3]], pixels from the centre of the first pixel,
+    which TUM's and ICL-NUIM's own folders lack. A negative fy means that the world is mirrored, as in ICL-NUIM; it is mirrored
+    back. Pictures without a pose or a depth within 0.02 s are left out, as in TUM's tool; there are no objects.
+    Raises StoreError for unreadable entries; with `keep_going` such pictures are left out and reported.
     """
     name, file = path.resolve().name, path / "calibration.txt"
     if not is_name(name):
@@ -64,7 +64,7 @@ def read(path: Path, *, keep_going: bool = False) -> ForeignDataset:
 
 
 def _lists(path: Path, texts: list[Path]) -> tuple[list[Timed], list[Timed]]:
-    """The pictures and the depths of a folder, and when: of rgb.txt and depth.txt, else of associations.txt."""
+    """The pictures and depths of a folder with their times, from rgb.txt and depth.txt, or else from associations.txt."""
     colors, depths, pairs = path / "rgb.txt", path / "depth.txt", path / "associations.txt"
     if colors.is_file():
         texts += [colors, depths]
@@ -76,7 +76,7 @@ def _lists(path: Path, texts: list[Path]) -> tuple[list[Timed], list[Timed]]:
 
 
 def _rows(file: Path) -> list[list[str]]:
-    """The words of each line that is no comment."""
+    """The words of each line, without comments."""
     try:
         text = read_text(file, "MAX_RECORD_BYTES")
     except (OSError, ValueError) as error:
@@ -96,14 +96,14 @@ def _timed(file: Path) -> list[Timed]:
 
 
 def _nearest(rows: Sequence[Timed], seconds: float) -> list[str] | None:
-    """The words of the line that is nearest in time, None where none is near."""
+    """The words of the line nearest in time; None if no line is near."""
     at = bisect_left(rows, seconds, key=lambda row: row[0])
     apart, words = min(((abs(time - seconds), words) for time, words in rows[max(at - 1, 0) : at + 1]), default=(np.inf, []))
     return words if apart <= APART else None
 
 
 def _pose(words: Sequence[str], mirrored: bool) -> NDArray[np.float64]:
-    """World_from_camera (3, 4) of tx ty tz qx qy qz qw."""
+    """The pose world_from_camera (3, 4) from tx ty tz qx qy qz qw."""
     x, y, z, *turn = map(float, words)
     a, b, c, w = turn
     pose = np.column_stack((matrix_from_quaternion((w, a, b, c)), (x, y, z)))

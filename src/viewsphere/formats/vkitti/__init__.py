@@ -83,7 +83,9 @@ def needs(options: Options) -> tuple[str, ...]:
 
 
 def refuses(scope: Scope, options: Options) -> Iterator[str]:
-    """Still pictures; other rigs and lenses; more objects or categories than there are colours; names with spaces or colons."""
+    """Reasons to refuse: still pictures, unsupported rigs and lenses, more objects or categories than colours, and names with
+    spaces or colons.
+    """
     yield from refusals.sequences(scope)
     yield from two_eyes(scope) if options.version == "2" else refusals.one_sensor(scope)
     yield from refusals.pinhole(scope)
@@ -106,7 +108,9 @@ class VKitti(Tree):
         yield from self._one(sample) if self._old else self._two(sample)
 
     def layout(self, path: str, counts: Mapping[str, int]) -> Layout:
-        """A line of names, then those of all frames; what all frames say alike is the name of a section, and written once."""
+        """A line of column names, then the lines of all frames. Text common to all frames is the name of a section, and is
+        written once.
+        """
         name = path.rpartition("/")[2]
         told = [f"{line[1:]}\n".encode() for line in sorted(counts, key=rows.track) if line]
         if name.endswith("_encoding.txt"):
@@ -155,7 +159,7 @@ class VKitti(Tree):
             yield Piece(f"{root}/info.txt", b"", told)
 
     def _place(self, sample: Sample) -> tuple[str, str]:
-        """The names of a sample's world and of its rendering: two of one world are of different variations."""
+        """The names of a sample's world and of its variation; renderings of one world differ in the variation."""
         name = scene(sample)
         if self._variation is None and sample.variation:
             return name.removesuffix(f"-{sample.variation}"), sample.variation

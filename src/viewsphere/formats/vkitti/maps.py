@@ -14,11 +14,11 @@ from viewsphere.model.sample import Sample
 
 MOST = 65535
 REACH = 10.0
-"""Metres along an axis to which scene flow reaches."""
+"""Range of scene flow along an axis, metres."""
 
 
 def flow_png(sample: Sample, channel: str) -> Coded:
-    """Flow as 16-bit RGB: shares of the picture's size from -1 to 1 as 0 to 65535, and 65535 where it is valid."""
+    """Flow as 16-bit RGB: shares of the picture's size from -1 to 1 as 0 to 65535, and 65535 if valid."""
     return Coded(sample.index, f"vkitti {channel}.png", partial(_flow, sample, channel))
 
 
@@ -32,7 +32,7 @@ def _flow(sample: Sample, channel: str) -> bytes:
 
 
 def scene_flow_png(sample: Sample, channel: str) -> Coded:
-    """Scene flow as 16-bit RGB: metres from -10 to 10 as 0 to 65535; 0 where there is none."""
+    """Scene flow as 16-bit RGB: metres from -10 to 10 as 0 to 65535. Unknown motion is encoded as 0 metres."""
     return Coded(sample.index, f"vkitti {channel}.png", partial(_scene_flow, sample, channel))
 
 
@@ -56,7 +56,7 @@ def instance_png(sample: Sample) -> Coded:
 
 
 def scene_png(sample: Sample, names: Names) -> Coded:
-    """Colours of objects, and of classes where there is none."""
+    """Colours of objects, and of classes elsewhere."""
 
     def make() -> bytes:
         ids = sample.channels["instances"]

@@ -1,4 +1,4 @@
-"""Names and colours of classes and objects, as Virtual KITTI has them."""
+"""Virtual KITTI's names and colours of classes and objects."""
 
 from __future__ import annotations
 
@@ -44,15 +44,15 @@ STUFF = {
     "vehicle": "Car",
     **dict.fromkeys(("wall", "door", "window"), "Building"),
 }
-"""The names of the stuff in Virtual KITTI; all else is Misc."""
+"""Virtual KITTI's names of stuff; all other stuff is Misc."""
 
 THINGS = {name.casefold(): name for name in ("Car", "Van", "Truck")}
 
 
 @dataclass(frozen=True, eq=False)
 class Names:
-    """The classes of a data set: the names of its things' classes by the categories' names, all colours by the classes' names,
-    and by the numbers of classes, (N, 3).
+    """The classes of a data set: the class names of its things by category name, all colours by class name, and all colours by
+    class number, (N, 3).
     """
 
     things: dict[str, str]
@@ -61,7 +61,7 @@ class Names:
 
     @classmethod
     def of(cls, classes: Iterable[SemanticClass]) -> Names:
-        """Of all of a data set's classes; a category that Virtual KITTI does not know keeps its colour."""
+        """The names and colours of all of a data set's classes; a category that Virtual KITTI lacks keeps its colour."""
         things, colors, numbered = dict[str, str](), dict(COLORS), {0: COLORS["Undefined"]}
         stuff = {i: COLORS[STUFF.get(name, "Misc")] for name, i in STUFF_IDS.items()}
         for one in classes:
@@ -76,14 +76,14 @@ class Names:
         return cls(things, colors, table)
 
     def table(self, head: str, *, things: bool = False) -> bytes:
-        """A text of all classes' colours, with or without those of things."""
+        """A text of all classes' colours, with or without the colours of things."""
         named = set(self.things.values())
         rows = (f"{name} {r} {g} {b}" for name, (r, g, b) in self.colors.items() if things or name not in named)
         return "".join(f"{row}\n" for row in (head, *rows)).encode()
 
 
 def object_colors() -> NDArray[np.uint8]:
-    """Colours (256, 3) of objects by their ids, of which no class has one; black of 0."""
+    """Colours (256, 3) of objects by their ids, distinct from all class colours; black for 0."""
     colors = palette() | np.uint8(1)
     colors[0] = 0
     return colors

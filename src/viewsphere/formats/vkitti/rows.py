@@ -33,13 +33,13 @@ HEADS = {
 """The names of the columns of each text."""
 
 OURS = np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]])
-"""From the world whose y points down to the one whose z points up."""
+"""The rotation from the world with y down to the world with z up."""
 
 UPRIGHT = np.array([[-1.0, 0, 0], [0, 0, -1], [0, -1, 0]])
-"""From an object's x right, y down, z ahead to the axes of its model."""
+"""The rotation from an object's axes x right, y down, z ahead to its model's axes."""
 
 STILL = 1e-9
-"""Metres or radians a second up to which an object does not move."""
+"""Greatest speed of an object that counts as not moving, metres or radians per second."""
 
 UNKNOWN = "Unknown"
 
@@ -88,7 +88,7 @@ def alpha(where: Stand) -> float:
 
 
 def seen(sample: Sample) -> Iterator[tuple[ObjectAnnotation, tuple[int, int, int, int], float]]:
-    """Objects of which something is seen: first and last column, first and last row, and which share of these is seen."""
+    """The visible objects: first and last column, first and last row, and the visible share of this box."""
     for o in sample.objects:
         if o.box2d is not None:
             x0, y0, x1, y1 = map(round, o.box2d)
@@ -102,7 +102,7 @@ def moves(o: ObjectAnnotation) -> bool:
 
 
 def texts(sample: Sample, camera: int) -> dict[str, bytes]:
-    """Return the lines that a frame adds to version 2's texts, but for `info` and `colors`."""
+    """Return the lines that a frame adds to version 2's texts, except `info` and `colors`."""
     k, at = sample.camera.intrinsics, (sample.instant, camera)
     found = {
         "intrinsic": line(*at, k.fx, k.fy, k.cx - 0.5, k.cy - 0.5),
@@ -142,7 +142,7 @@ def word(text: str) -> str:
 
 
 def infos(sample: Sample, names: Names) -> Iterator[str]:
-    """Yield the model and the colour of each object of a sequence, seen or not, after a mark; the export writes each text
+    """Yield the model and the colour of each object of a sequence, visible or not, after a mark; the export writes each text
     once.
     """
     for o in sample.objects:
@@ -157,6 +157,6 @@ def encodings(sample: Sample, names: Names) -> Iterator[str]:
 
 
 def track(told: str) -> int:
-    """The track id of what is told of an object, -1 for what is told of none."""
+    """The track id of an object's record, -1 for a record without an object."""
     first = told[1:].partition(" ")[0]
     return int(first.rpartition(":")[2]) if told else -1

@@ -46,11 +46,11 @@ from viewsphere.plugins.format import FormatSpec
 
 MOST = 254  # 255 is void
 NAMES = r"[^:#\x00-\x1f][^:\x00-\x1f]*"
-"""Names of categories that XML and a line of labelmap.txt can hold."""
+"""Allowed names of categories, for XML and for a line of labelmap.txt."""
 
 
 def refuses(scope: Scope, options: Options) -> Iterator[str]:
-    """Numbers of 8 bits, and names that fill a line."""
+    """Reasons to refuse: more categories or objects than 8 bits can number, and names that the files cannot hold."""
     yield from most_categories(scope, MOST)
     yield from most_objects(scope, MOST)
     yield from plain_names(scope, NAMES, "of one line, without : and without # in front")

@@ -1,4 +1,4 @@
-"""A PASCAL VOC data set made elsewhere: lists, pictures, an XML for each, and masks."""
+"""A PASCAL VOC data set from another source: lists, pictures, an XML for each, and masks."""
 
 from __future__ import annotations
 
@@ -39,10 +39,10 @@ from viewsphere.urls.inside import is_inside
 FLAGS = ("truncated", "occluded", "difficult")
 MAPS = ("Object", "Class")
 FOLDERS = (("Annotations", "JPEGImages"), ("", "JPEGImages"), ("annotations", "images"), ("labels", "data"))
-"""Of XML files and of pictures: VOC's, which lack the first where nothing has a box, supervision's, and FiftyOne's."""
+"""Folders of XML files and of pictures: VOC's (without the first if nothing has a box), supervision's, and FiftyOne's."""
 
 MOST_POLYGONS = 100
-"""Of an object."""
+"""Greatest number of polygons of an object."""
 
 BESIDE = 10
 """Largest distance of a polygon's corner, in image sizes."""
@@ -50,8 +50,9 @@ BESIDE = 10
 
 @dataclass(frozen=True)
 class _Kit:
-    """A data set's folder, and those of its annotations, empty if it has none, and of its pictures; what its labelmap.txt
-    names, and whether a picture needs an annotation: datumaro, which writes that file, writes none where nothing has a box.
+    """A data set's folder, and its folders of annotations (empty if it has none) and of pictures. Also the names in its
+    labelmap.txt, and whether a picture needs an annotation. datumaro, which writes labelmap.txt, writes no annotation for a
+    picture without boxes.
     """
 
     root: Path
@@ -66,8 +67,8 @@ class _Kit:
 
 @dataclass(frozen=True)
 class _Object:
-    """An object of an annotation: its place in the XML from 1 on, name, box as it is said, its polygons, whose pixels count
-    from 1, and what else is said of it.
+    """An object of an annotation: its place in the XML from 1, its name, its box as given, its polygons with pixels counted
+    from 1, and its other fields.
     """
 
     place: int
@@ -77,7 +78,7 @@ class _Object:
     polygons: tuple[tuple[float, ...], ...] = ()
 
     def corners(self, first: int) -> Box:
-        """The half-open box, where the first pixel has this number."""
+        """The half-open box, if the first pixel has this number."""
         return self.box[0] - first, self.box[1] - first, *self.box[2:]
 
 
@@ -85,8 +86,8 @@ def read(path: Path, *, keep_going: bool = False) -> ForeignDataset:
     """Return every picture and annotation of a folder with `Annotations` and `JPEGImages`, or with VOCdevkit/VOC<year>. It also
     reads the folders of supervision (`annotations`, `images`) and FiftyOne (`labels`, `data`).
 
-    Boxes count from 1 and end with their last pixel, as in VOC. Where any begins before 1, all count from 0 and end behind
-    their last pixel, as datumaro's and FiftyOne's do.
+    Boxes count from 1 and end with their last pixel, as in VOC. If any begins before 1, all count from 0 and end after their
+    last pixel, as in datumaro and FiftyOne.
 
     Raises StoreError with every mistake: pictures and annotations that are missing or outside, and broken objects. With
     `keep_going` these are left out and reported.
@@ -113,7 +114,7 @@ def read(path: Path, *, keep_going: bool = False) -> ForeignDataset:
 
 
 def _kit(path: Path) -> _Kit:
-    """The folders that have the annotations and the pictures."""
+    """The folders with the annotations and the pictures."""
     found = [path, *sorted(path.glob("VOC*")), *sorted(path.glob("VOCdevkit/VOC*"))]
     for root in found:
         for xml, pictures in FOLDERS:
@@ -137,7 +138,7 @@ def _listed_names(root: Path) -> list[str]:
 
 
 def _pictures(kit: _Kit, problems: list[str]) -> Iterator[Listed]:
-    """The pictures of all lists, each in the first that has it."""
+    """The pictures of all lists, each in the first list that contains it."""
     seen = set[str]()
     for split, source, names in _lists(kit, problems):
         for name in names:
@@ -150,7 +151,9 @@ def _pictures(kit: _Kit, problems: list[str]) -> Iterator[Listed]:
 
 
 def _lists(kit: _Kit, problems: list[str]) -> Iterator[tuple[str, Path, Sequence[str]]]:
-    """Each split with its list and the names of its pictures; lists of categories, whose lines have a number too, are none."""
+    """Each split with its list and the names of its pictures; lists of categories, whose lines also have a number, are
+    skipped.
+    """
     any_list, folder = False, "ImageSets/Main"
     if not (kit.root / folder).is_dir():
         folder = "ImageSets/Segmentation"
@@ -195,7 +198,7 @@ def _parsed(xml: Path) -> ElementTree.Element:
 
 
 def _objects(picture: Listed, listed: Sequence[str], problems: list[str]) -> Iterator[_Object]:
-    """The valid objects of an annotation, or, of a picture that has none, of its maps."""
+    """The valid objects of an annotation or, for a picture without one, of its maps."""
     xml = picture.said[0]
     if xml is None:
         yield from _unannotated(picture, listed, problems)
@@ -265,8 +268,8 @@ def _shown(categories: Mapping[str, Category], listed: Sequence[str], first: int
 def _annotation(
     number: int, o: _Object, category: Category, size: tuple[int, int], box: Box, first: int, mask: NDArray[np.bool_] | None
 ) -> ObjectAnnotation:
-    """An object with its mask, and as COCO would have it in `source`; there also the box as it is said in its data set, whose
-    first pixel has this number, where VOC would say another.
+    """An object with its mask; its `source` holds its COCO annotation and, if it differs from VOC's, the box as given in its
+    data set, whose first pixel has this number.
     """
     x0, y0, x1, y1 = box
     source: dict[str, Any] = {"bbox": [x0, y0, x1 - x0, y1 - y0], "area": (x1 - x0) * (y1 - y0), **o.said}

@@ -24,13 +24,13 @@ from viewsphere.store import Dataset
 BOX = ("xmin", "ymin", "xmax", "ymax")
 ROOT = "VOCdevkit/VOC2012"
 VIEWS = {0: "Frontal", 90: "Left", 180: "Rear", 270: "Right"}
-"""By the azimuth from which an object is seen."""
+"""VOC's views by the azimuth from which an object is seen."""
 
 TURNED, TILTED = 20, 45
-"""Most degrees of azimuth off a view, and of elevation and tilt."""
+"""Greatest deviation in azimuth from a view, and greatest elevation and tilt, degrees."""
 
 TRUNCATED, OCCLUDED = 0.15, 0.05
-"""Shares above which an object is so, by the guidelines."""
+"""Shares above which an object is truncated or occluded, by the guidelines."""
 
 
 class Options(Frozen):
@@ -55,8 +55,8 @@ class Voc(Tree):
         self._numbers = {category.id: number for number, category in enumerate(dataset.categories, 1)}
 
     def of(self, sample: Sample) -> Iterator[File | Piece]:
-        """A picture, its XML and its two maps. A picture of which some objects have no masks, as imported ones may, is not
-        listed as segmented.
+        """A picture, its XML and its two maps. A picture with objects without masks, as imported ones may have, is not listed
+        as segmented.
         """
         split, _, name = self.stem(sample).partition("/")
         suffix, seen = f".{self._options.pictures}", [o for o in sample.objects if o.box2d is not None]
@@ -76,7 +76,7 @@ class Voc(Tree):
             yield line(f"{ROOT}/ImageSets/Segmentation/{split}.txt", name)
 
     def rest(self) -> Iterator[File]:
-        """The names of the numbers."""
+        """The names of the category numbers."""
         colors = palette().tolist()
         named = ["background", *(category.name for category in self.dataset.categories)]
         rows = (f"{name}:{','.join(map(str, colors[number]))}::\n" for number, name in enumerate(named))
@@ -93,7 +93,7 @@ class Voc(Tree):
 
 
 def _object(o: ObjectAnnotation, difficult_below: float) -> dict[str, Any]:
-    """The fields of an object; of imported ones what they came with, or else flags of 0, as less is known."""
+    """The fields of an object. Imported objects keep their fields; missing flags are 0."""
     assert o.box2d is not None
     inside = 1 - o.truncation
     told = {key: value for key, value in (o.source or {}).items() if key in ("pose", "truncated", "occluded", "difficult")}
@@ -110,7 +110,7 @@ def _object(o: ObjectAnnotation, difficult_below: float) -> dict[str, Any]:
 
 
 def _bounds(box: Box, said: Any) -> list[int | float]:
-    """Its first and last pixels, counted from 1; of imported boxes that are no such the numbers that they came with."""
+    """The box's first and last pixels, counted from 1; imported boxes in another convention keep their numbers."""
     x0, y0, x1, y1 = box
     if isinstance(said, list) and len(numbers := _numbers(cast(list[Any], said))) == len(BOX):
         return numbers
@@ -128,13 +128,13 @@ def _polygons(o: ObjectAnnotation) -> dict[str, Any]:
 
 
 def _numbers(values: list[Any]) -> list[int | float]:
-    """Finite numbers, whole ones without a point; of what else there is, nothing."""
+    """The numbers, whole ones without a point; empty if any value is not a finite number."""
     found = [value for value in values if isinstance(value, int | float) and math.isfinite(value)]
     return [int(value) if value == int(value) else value for value in found] if len(found) == len(values) else []
 
 
 def _pose(view: ObjectView) -> str:
-    """VOC's name of a view; NaN is none."""
+    """VOC's name of a view; NaN is no view."""
 
     def off(azimuth: int) -> float:
         return abs((view.azimuth_deg - azimuth + 180) % 360 - 180)

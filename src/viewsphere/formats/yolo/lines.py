@@ -1,4 +1,4 @@
-"""Lines of labels: what their numbers mean."""
+"""Lines of labels, and the meaning of their numbers."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from viewsphere.errors import StoreError
 Float = NDArray[np.float64]
 
 BEYOND = 0.01
-"""Share of the picture by which labels may lie outside of it, as Ultralytics takes them."""
+"""Share of the picture by which labels may extend beyond it, as in Ultralytics."""
 
 MOST_POINTS = 1000
 
 
 @dataclass(frozen=True)
 class Kind:
-    """The properties of points in data.yaml: their names (their numbers where it has none), and their swaps in a mirror image.
+    """The properties of points in data.yaml: their names (or numbers if it has no names), and their swaps in a mirror image.
     `each` point has 2 numbers, x and y, or 3, with its visibility.
     """
 

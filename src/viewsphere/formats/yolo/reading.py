@@ -1,4 +1,4 @@
-"""A YOLO data set made elsewhere: data.yaml, pictures, and a file of labels for each."""
+"""A YOLO data set from another source: data.yaml, pictures, and a file of labels for each."""
 
 from __future__ import annotations
 
@@ -40,12 +40,12 @@ PICTURES = (".png", ".jpg", ".jpeg", ".webp", ".bmp", ".tif", ".tiff")
 SPLITS = ("train", "val", "test")
 NO_SPLITS = frozenset({"path", "names", "nc", "kpt_shape", "flip_idx", "kpt_names", "download", "channels"})
 LARGEST_FILE = 10_000_000
-"""Bytes of a data.yaml."""
+"""Greatest size of a data.yaml, bytes."""
 
 
 def read(path: Path, *, keep_going: bool = False) -> ForeignDataset:
     """Return every picture and label of a folder with data.yaml, or of one such file, as viewsphere.formats.yolo describes. It
-    also reads a folder with obj.names and lists, as Darknet has them, and a data.yaml that names no splits, beside `images`.
+    also reads a folder with obj.names and lists, as in Darknet, and a data.yaml without splits beside `images`.
 
     Raises StoreError with every mistake: splits and pictures that are missing or outside, broken lines, classes that have no
     name. With `keep_going` these are left out and reported.
@@ -89,7 +89,7 @@ def _load(file: Path) -> dict[str, Any]:
 
 
 def _names(told: Mapping[str, Any], file: Path) -> list[str]:
-    """The classes' names, by their numbers from 0 on."""
+    """The classes' names, by their numbers from 0."""
     names = told.get("names")
     if isinstance(names, dict):
         numbered = cast(dict[Any, Any], names)
@@ -103,7 +103,7 @@ def _names(told: Mapping[str, Any], file: Path) -> list[str]:
 
 
 def _pictures(root: Path, told: Mapping[str, Any], file: Path, problems: list[str]) -> Iterator[Listed]:
-    """The pictures of all splits, each in the first of those that have it."""
+    """The pictures of all splits, each in the first split that contains it."""
     seen = set[str]()
     base = str(told.get("path") or "")
     inside = base if base and is_inside(base) and (root / base).is_dir() else ""
@@ -127,8 +127,8 @@ def _pictures(root: Path, told: Mapping[str, Any], file: Path, problems: list[st
 
 
 def _relative(root: Path, inside: str, place: str) -> str | None:
-    """A split's folder or list, from the root: below `path`, or else the root; `../` before it is passed over, as by
-    Ultralytics, for what Roboflow writes. None if there is none.
+    """A split's folder or list, from the root: below `path`, or else the root; a leading `../`, which Roboflow writes, is
+    skipped, as in Ultralytics. None if it does not exist.
     """
     for prefix in (inside, ""):
         for said in (place, place.removeprefix("../")):
@@ -139,7 +139,7 @@ def _relative(root: Path, inside: str, place: str) -> str | None:
 
 
 def _listed(root: Path, relative: str, split: str, file: Path, problems: list[str]) -> Iterator[str]:
-    """The paths of a folder's pictures, or of those that a list names, from the root."""
+    """The paths of a folder's pictures, or of a list's pictures, relative to the root."""
     try:
         place = file_inside(root, relative)
         if place.is_dir():
@@ -211,7 +211,7 @@ def _shown(categories: Sequence[Category], kind: Kind, picture: Listed, index: i
 
 
 def _object(number: int, row: Row, categories: Sequence[Category], picture: Listed, kind: Kind) -> ObjectAnnotation:
-    """An object with what its line says, and as COCO would have it in `source`."""
+    """An object with the data of its line; its `source` holds its COCO annotation."""
     source = coco_of(row, picture.size)
     more: dict[str, Any] = {}
     if row.points is not None:
@@ -229,7 +229,7 @@ def _object(number: int, row: Row, categories: Sequence[Category], picture: List
 
 def _darknet(file: Path) -> dict[str, Any]:
     """Return a data.yaml for a folder with `obj.names` and lists of pictures: `<split>.txt`, or `images.txt`, which FiftyOne
-    writes. Raises StoreError where the names cannot be read.
+    writes. Raises StoreError if the names cannot be read.
     """
     try:
         names = [line.strip() for line in text_of(file) if line.strip()]
@@ -242,6 +242,6 @@ def _darknet(file: Path) -> dict[str, Any]:
 
 
 def _unsaid(root: Path) -> dict[str, Any]:
-    """The splits of a folder whose data.yaml names none: folders in `images`, or that itself."""
+    """The splits of a folder whose data.yaml names none: the folders in `images`, or `images` itself."""
     splits = {split: f"{IMAGES}/{split}" for split in ("train", "val", "test") if (root / IMAGES / split).is_dir()}
     return splits or {TRAIN: IMAGES}

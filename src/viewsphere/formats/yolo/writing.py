@@ -18,7 +18,7 @@ from viewsphere.model.sample import ObjectAnnotation, Sample
 from viewsphere.store import Dataset
 
 KINDS = (".png", ".jpg", ".webp")
-STATES = {0: 2, 1: 1}  # of our keypoints; outside and behind the camera are not labelled
+STATES = {0: 2, 1: 1}  # of viewsphere's keypoints; points outside or behind the camera are not labelled
 
 
 class Options(Frozen):
@@ -49,9 +49,9 @@ class Yolo(Tree):
         yield File(f"labels/{stem}.txt", "".join(f"{row}\n" for row in rows if row).encode())
 
     def rest(self) -> Iterator[File]:
-        """The description that training begins from."""
+        """The data.yaml, from which training starts."""
         splits = {name: f"images/{name}" for name in self.dataset.splits}
-        data: dict[str, Any] = {**splits}  # without a path, which Ultralytics would take from the working folder
+        data: dict[str, Any] = {**splits}  # without a path, which Ultralytics would resolve from the working folder
         data |= {name: next(iter(splits.values())) for name in ("train", "val") if name not in splits}
         if self._points:
             data["kpt_shape"] = [len(self._points), 3]
@@ -62,7 +62,7 @@ class Yolo(Tree):
         yield File("data.yaml", yaml.safe_dump(data, sort_keys=False, allow_unicode=True).encode())
 
     def _row(self, sample: Sample, o: ObjectAnnotation) -> str:
-        """A line of labels; empty for an object that the task has nothing for."""
+        """A line of labels; empty for an object without data for the task."""
         assert o.box2d is not None
         size = np.array([sample.width, sample.height])
         low, high = np.array(o.box2d[:2]) / size, np.array(o.box2d[2:]) / size
@@ -95,13 +95,15 @@ class Yolo(Tree):
 
 
 def _rings(o: ObjectAnnotation) -> list[list[float]]:
-    """The rings of its mask; of an imported object those that it came with."""
+    """The rings of an object's mask; an imported object keeps its own rings."""
     said = (o.source or {}).get("segmentation")
     return said if said and isinstance(said, list) else o.polygons if o.area else []
 
 
 def _points(dataset: Dataset) -> dict[str, int]:
-    """The names of all models' points, and their numbers; of imported data sets, those of the first object that has some."""
+    """The names of all models' points, and their numbers; for imported data sets, the points of the first object with
+    points.
+    """
     names = [name for model in dataset.models for name in (model.keypoints.points if model.keypoints else ())]
     if not names:
         marked = (o.extra.get("keypoint_names") for sample in dataset for o in sample.objects)
@@ -110,7 +112,7 @@ def _points(dataset: Dataset) -> dict[str, int]:
 
 
 def _flipped(dataset: Dataset, points: Mapping[str, int]) -> list[int]:
-    """By each point, which other it becomes in a mirror image."""
+    """The index of each point's counterpart in a mirror image."""
     told = next((sample.source["flip_idx"] for sample in dataset if sample.source and "flip_idx" in sample.source), None)
     if told is not None and len(told) == len(points):
         return list(told)

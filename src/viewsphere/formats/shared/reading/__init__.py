@@ -1,1 +1,1 @@
-"""Data sets of other tools on their way into a store or a recipe: pictures, poses, models, classes."""
+"""The import of other tools' data sets into a store or a recipe: pictures, poses, models, classes."""

@@ -1,4 +1,4 @@
-"""Data sets of cameras, and perhaps a mesh of what they show, on their way into a recipe that renders them again."""
+"""The conversion of data sets of cameras, optionally with a mesh of their scene, into a recipe that renders them again."""
 
 from __future__ import annotations
 
@@ -21,20 +21,20 @@ MESH = "mesh"
 
 ENDINGS = (".ply", ".obj", ".glb", ".stl", ".off")
 BEST = ("meshed-poisson.ply", "meshed-delaunay.ply")
-"""Names by which COLMAP's own meshes go first."""
+"""Names of COLMAP's own meshes, which are preferred."""
 
 HEAD_BYTES = 10_000
-"""Of a PLY file, at most, until its data begin."""
+"""Greatest length of a PLY file's header."""
 
 
 def pose_of(matrix: ArrayLike) -> Pose:
-    """A motion (4, 4) or (3, 4) as shots have it."""
+    """A motion (4, 4) or (3, 4) in the form used by shots."""
     a, b, c = ((x, y, z, w) for x, y, z, w in np.asarray(matrix, np.float64)[:3].tolist())
     return a, b, c, IDENTITY[3]
 
 
 def nearest_up(shots: Sequence[ListedShot]) -> Axis:
-    """The axis of the world that is nearest to the mean of where cameras have up."""
+    """The axis of the world that is nearest to the cameras' mean up direction."""
     up = -np.array([np.array(shot.world_from_camera)[:3, 1] for shot in shots]).reshape(-1, 3).sum(axis=0)
     axes: tuple[tuple[Axis, Axis], ...] = (("+x", "-x"), ("+y", "-y"), ("+z", "-z"))
     largest = int(np.abs(up).argmax())
@@ -44,8 +44,8 @@ def nearest_up(shots: Sequence[ListedShot]) -> Axis:
 def cameras_again(
     path: Path, shots: tuple[ListedShot, ...], root: Path, folders: Iterable[str], format_: str, up: Axis
 ) -> SourceCameras:
-    """The cameras of a data set around the first mesh in these folders of `root`, which is in the cameras' world; none where
-    there is none. Raises StoreError without cameras, and for a mesh that a link leads out of the folder to.
+    """The cameras of a data set around the first mesh in these folders of `root`; the mesh, if any, is in the cameras' world.
+    Raises StoreError without cameras, and for a mesh behind a link that leads out of the folder.
     """
     if not shots:
         raise StoreError(f"{path}: expected pictures with cameras; found none")

@@ -1,4 +1,4 @@
-"""Numbers of classes in data sets that have a fixed list of these."""
+"""Numbers of classes in data sets with a fixed list of classes."""
 
 from __future__ import annotations
 
@@ -28,8 +28,8 @@ class Numbered:
         *,
         counted: bool = True,
     ) -> Numbered:
-        """Of a data set's classes. `stuff`, `things`: numbers by names, those of things as `plain` has them; other stuff is 0.
-        Other things are `other`, or, `counted`, are numbered from there on.
+        """The numbers of a data set's classes. `stuff`, `things`: numbers by names, normalised by `plain` for things. Other
+        stuff is 0. Other things are `other` or, if `counted`, are numbered from `other`.
         """
         numbers = {0: 0} | {i: stuff.get(name, 0) for name, i in STUFF_IDS.items()}
         own = dict[int, str]()

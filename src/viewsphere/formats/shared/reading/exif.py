@@ -1,4 +1,4 @@
-"""Pictures of other tools whose EXIF tag says how a viewer is to turn them: labels speak of what viewers show."""
+"""Pictures of other tools with an EXIF rotation: labels describe the rotated picture that viewers show."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ Size = tuple[int, int]
 
 
 def shown_size(file: Path, told: object = None) -> Size:
-    """Width and height of a picture as it is shown: turned as its tag says, unless the size that labels tell, (width, height),
-    is that of the pixels as they are stored and not the other. Raises what `viewsphere.codecs.size.opened` does.
+    """Width and height of a picture as shown: rotated by its tag, unless the size in the labels, (width, height), fits only
+    the pixels as stored. Raises the same errors as `viewsphere.codecs.size.opened`.
     """
     with opened(file) as picture:
         width, height = picture.size
@@ -25,7 +25,7 @@ def shown_size(file: Path, told: object = None) -> Size:
 
 
 def upright(file: Path, size: Size) -> Path | Loaded:
-    """A picture of this shown size, which every reader shows alike: the file itself, or a PNG where a tag turns it."""
+    """A picture of this shown size that all readers show alike: the file itself, or a PNG if a tag rotates it."""
     from PIL import ImageOps
 
     with opened(file) as picture:

@@ -1,4 +1,4 @@
-"""Pictures in splits, each with files that say what it shows, from data sets of other tools, on their way into a store."""
+"""The import of pictures in splits, each with label files, from data sets of other tools into a store."""
 
 from __future__ import annotations
 
@@ -22,16 +22,15 @@ from viewsphere.validation.errors import dotted, first_of
 
 SUFFIXES = (".jpg", ".jpeg", ".png", ".webp", ".bmp")
 MISTAKES = (LookupError, TypeError, ValueError, AttributeError, ArithmeticError, OSError, SyntaxError, UserError)
-"""Errors of files that are broken, missing or outside, or of another structure than expected."""
+"""Errors of files that are broken, missing or outside the folder, or that have an unexpected structure."""
 
 SPLITS = TRAIN, VAL, TEST = ("train", "val", "test")
-"""In the order in which they are told, before others."""
+"""Splits that are reported first, in this order."""
 
 
 @dataclass(frozen=True)
 class Listed:
-    """A picture of a split, its name in the data set, its size as it is shown, and the files that say what it shows, None for
-    one that is not there.
+    """A picture of a split: its name in the data set, its size as shown, and its label files (None for a missing one).
     """
 
     split: str
@@ -45,7 +44,9 @@ Picture = TypeVar("Picture", bound=Listed)
 
 
 def one_line(error: object) -> str:
-    """An error's message without line breaks: of values out of bounds the first, with its field; Python's own framed."""
+    """An error's message without line breaks: for values out of bounds the first one with its field; Python's own messages get
+    a frame.
+    """
     match error:
         case ValidationError():
             place = error.errors(include_url=False)[0]["loc"]
@@ -60,13 +61,13 @@ def one_line(error: object) -> str:
 
 
 def text_of(file: Path) -> list[str]:
-    """The lines of a text of a size that the limit allows; raises ValueError for what is no UTF-8."""
+    """The lines of a text within the size limit. Raises ValueError for invalid UTF-8."""
     return read_text(file, "MAX_ANNOTATION_BYTES").splitlines()
 
 
 def lists(root: Path, folder: str, problems: list[str]) -> Iterator[tuple[str, Path, Sequence[str]]]:
-    """The splits of a folder of lists, `<split>.txt`, below the root: train, val and test first, each with its file and the
-    lines that are not empty. `trainval` is passed over where there are train and val; the problems of the others are appended.
+    """The splits of a folder of lists, `<split>.txt`, below the root: train, val and test first, each with its file and its
+    non-empty lines. `trainval` is skipped if train and val exist; the problems of unreadable lists are appended.
     """
     files = {file.stem: file for file in sorted((root / folder).glob("*.txt"))}
     if {TRAIN, VAL} <= files.keys():
@@ -92,10 +93,10 @@ def listed_dataset(
     models: Sequence[ForeignModel] = (),
     also: str = "",
 ) -> ForeignDataset:
-    """A data set of these pictures. `most`: the largest number of objects that one shows, or the largest of their ids;
-    `shown` gives the sample of a picture, of this number; `also`: what else the data set's digest tells apart.
+    """A data set of these pictures. `most`: the largest number of objects in a picture, or their largest id; `shown` returns
+    the sample of a picture with this number; `also`: further text for the data set's digest.
 
-    Raises StoreError for the problems, unless it is to keep going, and where there are no pictures.
+    Raises StoreError for the problems, unless it is to keep going, and if there are no pictures.
     """
     if not keep_going:
         refuse_broken(problems)
@@ -123,12 +124,12 @@ def _ordered(splits: Iterable[str]) -> tuple[str, ...]:
 
 
 def unposed(picture: Listed, index: int, objects: Sequence[Any], source: Mapping[str, Any]) -> Sample:
-    """A sample of a picture that nobody knows where it was taken."""
+    """A sample of a picture with an unknown camera pose."""
     return Sample(index, picture.split, None, None, tuple(objects), {}, {}, picture.size, source)
 
 
 def _digest(pictures: Sequence[Listed], texts: Sequence[str]) -> str:
-    """SHA-256 of all that is said of the pictures, each file once, of their names, and of these texts."""
+    """SHA-256 of the pictures' label files (each once), of their names, and of these texts."""
     digest, seen = hashlib.sha256(), set[Path]()
     for picture in pictures:
         digest.update(f"{picture.split}/{picture.name}\0".encode(errors="backslashreplace"))

@@ -1,4 +1,4 @@
-"""Objects of other tools' data sets whose place is known: all that follows from it."""
+"""Objects of other tools' data sets with a known position, and the fields that follow from it."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ Float = NDArray[np.float64]
 
 
 def placed(box: Float, world_from_object: Float, camera_from_world: Float, lens: Intrinsics | None) -> dict[str, Any]:
-    """Fields of an object with this box (8, 3) of its own axes, metres, and this pose: boxes, poses, view and size.
+    """Fields of an object with this box (8, 3) in its own axes, metres, and this pose: boxes, poses, view and size.
 
-    Matrices are rigid, (4, 4). Without a lens nobody knows the box's pixels. Where the box is NaN, the view is that of the
-    origin of the object's axes. Raises ValueError for a matrix that is not rigid.
+    Matrices are rigid, (4, 4). Without a lens the box's pixels are unknown. If the box is NaN, the view is that of the origin
+    of the object's axes. Raises ValueError for a matrix that is not rigid.
     """
     camera_from_object = compose(camera_from_world, world_from_object)
     in_camera = transform(camera_from_object, box)

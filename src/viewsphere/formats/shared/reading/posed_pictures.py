@@ -1,4 +1,4 @@
-"""Pictures with known cameras, from data sets of other tools, on their way into a store."""
+"""The import of pictures with known cameras from data sets of other tools into a store."""
 
 from __future__ import annotations
 
@@ -26,13 +26,13 @@ from viewsphere.store.paths import file_inside, is_name
 
 RIGHT_ANGLES = 1e-3
 MOST = 1e9
-"""The limit below which every number of a pose is."""
+"""Upper limit of every number of a pose."""
 
 
 @dataclass(frozen=True)
 class Posed:
-    """A picture's file, its camera, and where it belongs; a file of 16 bits with depth along z in steps of so many metres, 0
-    where nothing is known.
+    """A picture's file, its camera, and its place in the data set; and its depth: a 16-bit file along z in steps of this many
+    metres, 0 if unknown.
     """
 
     file: Path
@@ -57,7 +57,7 @@ def without_world(path: Path, expected: str, *patterns: str) -> StoreError:
 
 
 def camera_of(lens: Intrinsics, pose: NDArray[np.float64]) -> Camera:
-    """The camera of a pose, world_from_camera (3 or 4, 4), OpenCV's axes; raises ValueError for one that is not rigid."""
+    """The camera of a pose, world_from_camera (3 or 4, 4), OpenCV's axes; raises ValueError for a pose that is not rigid."""
     turn, center = np.array(pose[:3, :3], np.float64), np.array(pose[:3, 3], np.float64)
     if not (np.abs(pose) < MOST).all() or np.abs(turn @ turn.T - np.eye(3)).max() > RIGHT_ANGLES or np.linalg.det(turn) < 0:
         raise ValueError("expected a rigid pose; found another")
@@ -66,7 +66,7 @@ def camera_of(lens: Intrinsics, pose: NDArray[np.float64]) -> Camera:
 
 
 def picture_inside(root: Path, relative: str, *endings: str) -> tuple[Path, tuple[int, int]]:
-    """A picture below a folder, by its path or that and one of the endings, and its width and height."""
+    """A picture below a folder, by its path with or without one of the endings, and its width and height."""
     names = [relative, *(relative + ending for ending in endings)]
     file = next((file for file in (file_inside(root, name) for name in names) if file.is_file()), None)
     if file is None:
@@ -76,7 +76,7 @@ def picture_inside(root: Path, relative: str, *endings: str) -> tuple[Path, tupl
 
 
 def check_picture(size: tuple[int, int], lens: Intrinsics) -> None:
-    """Raise ValueError for a picture that is not of its camera's size."""
+    """Raise ValueError for a picture whose size differs from its camera's."""
     if size != (lens.width, lens.height):
         raise ValueError(f"expected a picture of {lens.width} x {lens.height} pixels; found {size[0]} x {size[1]}")
 
@@ -84,8 +84,8 @@ def check_picture(size: tuple[int, int], lens: Intrinsics) -> None:
 def posed_dataset(
     path: Path, found: Sequence[Posed], texts: Sequence[Path], problems: Sequence[str], keep_going: bool
 ) -> ForeignDataset:
-    """A data set of these pictures, without objects. `texts`: the files that say what there is. Raises StoreError for the
-    problems, unless it is to keep going, and where nothing is left.
+    """A data set of these pictures, without objects. `texts`: the files that describe them. Raises StoreError for the
+    problems, unless it is to keep going, and if no picture is left.
     """
     if not keep_going:
         refuse_broken(problems)
@@ -121,7 +121,7 @@ def _frames(found: Sequence[Posed]) -> Iterator[ForeignFrame]:
 
 
 def _depth(file: Path, one: Posed) -> Loaded:
-    """A map of depth that says its step, as stored ones do."""
+    """A depth map with its step, like stored ones."""
     try:
         steps = decode_png(read_bytes(file, "MAX_PICTURE_BYTES"))
     except (OSError, UserError) as error:

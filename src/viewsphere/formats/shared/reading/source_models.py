@@ -1,4 +1,4 @@
-"""Models of other tools' data sets, on their way into a store."""
+"""The import of models from other tools' data sets into a store."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from viewsphere.store.foreign import ForeignModel
 
 
 def foreign_model(mesh: Mesh, key: str, category: Category, **said: Any) -> ForeignModel:
-    """A model of a category in its object's axes, metres, with what else the data set has `said` of it, such as `keypoints`."""
+    """A model of a category in its object's axes, metres, with its other data in `said`, such as `keypoints`."""
     vertices = mesh.vertices.astype(np.float64)
     box, digest = Box3d.around(vertices).corners, hashlib.sha256(repr(said).encode())
     for array in (mesh.vertices, mesh.triangles):

@@ -1,4 +1,4 @@
-"""PASCAL VOC's maps of objects and of classes, as it, PASCAL3D+ and others write them."""
+"""Maps of objects and of classes in PASCAL VOC's form, which PASCAL3D+ and others also use."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from viewsphere.errors import StoreError
 from viewsphere.model.sample import Box
 
 VOID = 255
-"""The number of pixels of which nobody says what they show."""
+"""The number of unlabelled (void) pixels."""
 
 ALIKE = 0.5
 """Least overlap, intersection over union, of an object's box and the box around its pixels."""
@@ -23,14 +23,16 @@ Numbers = NDArray[np.uint8]
 
 
 def check_map(file: Path, size: tuple[int, int]) -> None:
-    """Raise StoreError for a map of another size than (width, height), or with other pixels than numbers or colours."""
+    """Raise StoreError for a map whose size is not (width, height), or whose pixels are neither numbers nor colours."""
     with opened(file) as found:
         if found.size != size or found.mode not in ("P", "L", "RGB"):
             raise StoreError(f"expected objects' numbers in {file.name}, of the picture's size; found other pixels")
 
 
 def numbers_of(file: Path) -> Numbers:
-    """The numbers of a map, (H, W) uint8; colours, which datumaro writes, are those of VOC's palette, any others void."""
+    """The numbers of a map, (H, W) uint8; colours, which datumaro writes, are looked up in VOC's palette, and other colours
+    are void.
+    """
     with opened(file) as found:
         pixels = np.array(found)
     if pixels.ndim == 2:
@@ -53,8 +55,8 @@ def boxes_of(numbers: Numbers) -> dict[int, Box]:
 
 
 def numbered(said: Sequence[tuple[int, Box]], found: Mapping[int, Box]) -> list[int]:
-    """The number in the map of each object, 0 if none, by its place in the annotation and its box. VOC's are the places
-    themselves; datumaro counts those that have pixels: there the boxes tell.
+    """The number of each object in the map, 0 if none, by its place in the annotation and its box. In VOC the numbers are the
+    places. datumaro counts only objects with pixels; then the boxes decide.
     """
     sure = {i: place for i, (place, box) in enumerate(said) if place in found and overlap(box, found[place]) >= ALIKE}
     for i, (_, box) in enumerate(said):
@@ -67,8 +69,8 @@ def numbered(said: Sequence[tuple[int, Box]], found: Mapping[int, Box]) -> list[
 
 
 def unannotated(objects: Numbers, classes: Numbers, names: Sequence[str]) -> Iterator[tuple[int, str, Box]]:
-    """Number, category and box of each object of a picture without annotation, of which most pixels are of a class; raises
-    ValueError for a class that has no name.
+    """Number, category and box of each object of a picture without an annotation; the class of most of its pixels is its
+    category. Raises ValueError for a class without a name.
     """
     for number, box in boxes_of(objects).items():
         most = int(np.bincount(classes[objects == number]).argmax())

@@ -1,1 +1,3 @@
-"""Exports: the form of most formats, their files and pictures, sequences, and the limits for which they refuse."""
+"""Exports: the form of most formats, their files and pictures, sequences, and the limits beyond which formats refuse data
+sets.
+"""

@@ -1,4 +1,4 @@
-"""The contents of an export's files, to write them and to prove them."""
+"""The contents of an export's files, for writing and for checking them."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Coded:
-    """The encoded bytes of a frame, by the encoding's name; exports of one pass that share an encoding make them once."""
+    """The encoded bytes of a frame, by the encoding's name; exports in one pass that share an encoding compute them once."""
 
     frame: int
     name: str
@@ -31,20 +31,24 @@ class Coded:
 
 
 Content = str | bytes | Coded | NDArray[np.bool_]
-"""A stored file, by its path from the data set's root, bytes, what an encoding makes, or a mask (H, W), which becomes a PNG."""
+"""A file's content: a stored file by its path from the data set's root, bytes, encoded bytes, or a mask (H, W), which becomes
+a PNG.
+"""
 
 Expected = tuple[int | None, str, Content]
-"""The frame that a file belongs to (None: to no single one), the file's path from the export's folder, and its content."""
+"""The frame that a file belongs to (None if there is no single one), the file's path from the export's folder, and its
+content.
+"""
 
 PNG = b"\x89PNG"
 """The beginning of every PNG."""
 
 BLOCK = 1 << 20
-"""Bytes of a file that are compared at once."""
+"""Number of bytes of a file to compare at once."""
 
 
 def put(dataset: Dataset, content: Content, file: Path) -> None:
-    """Make a file of this content."""
+    """Write a file with this content."""
     if isinstance(content, str):
         dataset.link(content, file)
         return
@@ -57,18 +61,17 @@ def put(dataset: Dataset, content: Content, file: Path) -> None:
 
 
 def models(dataset: Dataset) -> Iterator[Expected]:
-    """The files of the normalised models, as `Dataset.link_models` puts them into MODELS."""
+    """The files of the normalised models, as `Dataset.link_models` places them in MODELS."""
     return ((None, f"MODELS/{inside}", stored) for inside, stored in dataset.model_files())
 
 
 def check_files(
     dataset: Dataset, folder: Path, expected: Iterable[Expected], again: Iterable[Expected], besides: Collection[str]
 ) -> Iterator[Remark]:
-    """Every expected file is there and holds what it should, and there is no other but those of the names `besides`, which are
-    looked at when all expected ones were.
+    """Check that every expected file exists with the right content, and that there are no other files except those named in
+    `besides`. These are checked after all expected files.
 
-    `again`: the expected files once more; that is read only where there are more files than expected, so that their names need
-    not be kept.
+    `again`: the expected files once more, read only if there are more files than expected, so that names need not be kept.
     """
     there = 0
     for frame, name, content in expected:
@@ -90,7 +93,7 @@ def _problem(dataset: Dataset, content: Content, file: Path) -> str | None:
     if not file.is_file():
         return "expected a file, found none"
     if isinstance(content, str):
-        from viewsphere.store.foreign import Loaded  # only a data set that was loaded has them
+        from viewsphere.store.foreign import Loaded  # only a loaded data set has them
 
         stored = dataset.stored(content)
         same = read_bytes(file) == stored.data if isinstance(stored, Loaded) else same_bytes(stored, file)

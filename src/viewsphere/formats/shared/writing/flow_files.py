@@ -15,10 +15,10 @@ FLO_TAG = b"PIEH"
 """The beginning of .flo files, and of Sintel's .dpt and .cam: the little-endian float 202021.25."""
 
 UNKNOWN = np.float32(1e10)
-"""Flow that is not known, in .flo files: all beyond 1e9."""
+"""Unknown flow in .flo files, where all values beyond 1e9 are unknown."""
 
 STEPS, ZERO = 64, 2**15
-"""Of KITTI's flow in a pixel, and the number of no motion."""
+"""Steps of KITTI's flow in a pixel, and the number for no motion."""
 
 
 def tagged(array: NDArray[Any]) -> bytes:
@@ -34,7 +34,7 @@ def pfm(array: NDArray[Any]) -> bytes:
 
 
 def flo_file(sample: Sample, channel: str = "flow") -> Coded:
-    """A channel of flow as .flo, 1e10 where there is none."""
+    """A channel of flow as .flo, with 1e10 for unknown flow."""
 
     def make() -> bytes:
         flow = sample.channels[channel]
@@ -44,7 +44,7 @@ def flo_file(sample: Sample, channel: str = "flow") -> Coded:
 
 
 def flow_pfm(sample: Sample, channel: str, nothing: float = 0.0) -> Coded:
-    """A channel of flow as PFM of three numbers, the third 0; `nothing` where there is none."""
+    """A channel of flow as PFM of three numbers, the third 0; `nothing` for unknown flow."""
 
     def make() -> bytes:
         flow = sample.channels[channel]
@@ -54,7 +54,7 @@ def flow_pfm(sample: Sample, channel: str, nothing: float = 0.0) -> Coded:
 
 
 def map_pfm(sample: Sample, channel: str, nothing: float = 0.0) -> Coded:
-    """A channel of one number as PFM, `nothing` where it is NaN."""
+    """A single-valued channel as PFM, with `nothing` in place of NaN."""
 
     def make() -> bytes:
         array = sample.channels[channel].astype(np.float32)
@@ -64,9 +64,9 @@ def map_pfm(sample: Sample, channel: str, nothing: float = 0.0) -> Coded:
 
 
 def flow_png(flow: NDArray[np.float32], valid: NDArray[np.bool_]) -> bytes:
-    """KITTI's flow (H, W, 2) as 16-bit RGB: right and down in steps of 1/64 pixel from 2^15 on, and 1 where it is valid.
+    """KITTI's flow (H, W, 2) as 16-bit RGB: right and down in steps of 1/64 pixel from 2^15, and 1 if valid.
 
-    Flow beyond 512 pixels, which has no number, is not valid; what is not is 0, 0, 0.
+    Flow beyond 512 pixels cannot be expressed and is invalid. Invalid flow is 0, 0, 0.
     """
     steps = np.rint(np.where(valid[..., None], flow.astype(np.float64), 0) * STEPS) + ZERO
     has = valid & ((steps >= 0) & (steps <= 65535)).all(axis=-1)
@@ -74,15 +74,15 @@ def flow_png(flow: NDArray[np.float32], valid: NDArray[np.bool_]) -> bytes:
 
 
 def steps_png(numbers: NDArray[Any], valid: NDArray[np.bool_]) -> bytes:
-    """KITTI's disparity (pixels) or depth (metres), (H, W), as 16 bits in steps of 1/256; 0 where it is not valid, or too large
-    for 16 bits. What is valid and less than half a step counts as one step.
+    """KITTI's disparity (pixels) or depth (metres), (H, W), as 16 bits in steps of 1/256; 0 if it is invalid or too large for
+    16 bits. Valid values below half a step count as one step.
     """
     steps = np.maximum(np.rint(np.where(valid, numbers.astype(np.float64), 0) * 256), 1)
     return encode_png(np.where(valid & (steps <= 65535), steps, 0).astype(np.uint16))
 
 
 def states_png(sample: Sample, channel: str, *states: int) -> Coded:
-    """Pixels of a channel of states that are one of these, 255, others 0, as 8-bit grey PNG."""
+    """An 8-bit grey PNG of a channel of states: 255 for pixels with one of these states, else 0."""
 
     def make() -> bytes:
         return encode_png(np.where(np.isin(sample.channels[channel], states), 255, 0).astype(np.uint8))

@@ -1,4 +1,4 @@
-"""The pieces of JSON that Ruiz et al. 2019 (VipIMAGE) write, in their native format and in their COCO files alike."""
+"""The pieces of JSON that Ruiz et al. 2019 (VipIMAGE) use both in their native format and in their COCO files."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from viewsphere.store import ModelInfo
 
 
 def json_bytes(value: Any) -> bytes:
-    """Compact JSON, floats to the last digit; raises StoreError for NaN and infinity, which damaged records lead to."""
+    """Compact JSON, floats to the last digit. Raises StoreError for NaN and infinity, which come from damaged records."""
     try:
         return json.dumps(value, separators=(",", ":"), allow_nan=False).encode("ascii")
     except ValueError as error:
@@ -51,13 +51,15 @@ def _vehicle(info: ModelInfo) -> dict[str, Any]:
 
 
 def _deforming(info: ModelInfo) -> dict[str, Any]:
-    """Of a model that deforms: the file of all its time steps, which lies beside that of this one, and its frame there."""
+    """The fields of a deforming model: the file of all its time steps, beside the file of this step, and the step's frame
+    there.
+    """
     assert info.step is not None
     track = {"id_track": info.track} if info.track else {}
     return {"animation": PurePosixPath(info.glb).name, "frame": info.step.frame, "seconds": info.step.seconds, **track}
 
 
 def transformation_matrix(camera: Camera) -> dict[str, list[list[float]]]:
-    """K (3, 3) and RT (3, 4), world to camera; the lens' distortion is not in it."""
+    """K (3, 3) and RT (3, 4), world to camera, without the lens' distortion."""
     motion = zip(camera.R.tolist(), camera.t.tolist(), strict=True)
     return {"K": camera.K.tolist(), "RT": [[*row, t] for row, t in motion]}

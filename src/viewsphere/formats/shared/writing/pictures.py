@@ -1,4 +1,4 @@
-"""Pictures and maps of samples as files of other formats have them; what several formats encode alike is made once."""
+"""Pictures and maps of samples, encoded for other formats; encodings shared by several formats are computed once."""
 
 from __future__ import annotations
 
@@ -15,18 +15,20 @@ from viewsphere.model.channel import picture_of
 from viewsphere.model.sample import Sample
 
 JPEG_QUALITY = 95
-"""Of pictures that a format wants as JPEG and the store keeps as something else."""
+"""Quality of pictures that a format requires as JPEG and the store keeps in another encoding."""
 
 
 def suffix_of(sample: Sample, *suffixes: str) -> str:
-    """The ending of a sample's picture, with its dot, in a format that takes these; the first where the store has another."""
+    """The ending of a sample's picture, with its dot, in a format that supports these; the first one if the stored picture has
+    another.
+    """
     own = PurePosixPath(sample.picture_file or "").suffix.lower()
     return own if own in suffixes else suffixes[0]
 
 
 def picture(sample: Sample, *suffixes: str) -> Content:
-    """A sample's picture in a file of one of these endings (`.png`, `.jpg`): the stored file where it is one, so that it can be
-    linked, else encoded anew, as the first; alpha is laid over black.
+    """A sample's picture in a file of one of these endings (`.png`, `.jpg`): the stored file if it has one of them, so that it
+    can be linked; otherwise a new encoding in the first. Alpha is composited over black.
     """
     file = sample.picture_file
     if file is not None and PurePosixPath(file).suffix.lower() in suffixes:
@@ -43,20 +45,20 @@ def picture(sample: Sample, *suffixes: str) -> Content:
 
 
 def opaque(pixels: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    """A picture (H, W, 3), its straight alpha laid over black."""
+    """A picture (H, W, 3) with its straight alpha composited over black."""
     if pixels.shape[2] == 3:
         return pixels
     return np.rint(pixels[..., :3] * (pixels[..., 3:] / 255.0)).astype(np.uint8)
 
 
 def png(sample: Sample, name: str, array: NDArray[Any]) -> Coded:
-    """An array as PNG, under a name that says how it was made of the sample."""
+    """An array as PNG, under a name that identifies how it was derived from the sample."""
     return Coded(sample.index, f"{name}.png", lambda: encode_png(array))
 
 
 def depth_png(sample: Sample, metres: float, nothing: int = 0, most: int = 65535) -> Coded:
-    """Depth along z in steps of so many metres, 16 bits, `nothing` where there is no surface; farther than `most` steps counts
-    as `most`, and what is nearer than half a step as one.
+    """Depth along z in steps of this many metres, 16 bits; `nothing` without a surface. Depth beyond `most` steps counts as
+    `most`, depth below half a step as one.
     """
 
     def make() -> bytes:
@@ -66,7 +68,7 @@ def depth_png(sample: Sample, metres: float, nothing: int = 0, most: int = 65535
 
 
 def depth_steps(sample: Sample, metres: float, nothing: int = 0, most: int = 65535) -> NDArray[np.uint16]:
-    """Depth along z in whole steps, (H, W) uint16, as `depth_png` keeps it."""
+    """Depth along z in whole steps, (H, W) uint16, as in `depth_png`."""
     depth = sample.channels["depth"].astype(np.float64)
     seen = np.isfinite(depth) & (depth > 0)
     steps = np.clip(np.rint(np.where(seen, depth, metres) / metres), 1, most)

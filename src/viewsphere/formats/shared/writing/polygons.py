@@ -1,4 +1,4 @@
-"""Masks as single rings, for formats that have one polygon an object."""
+"""Masks as single rings, for formats with one polygon for each object."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 
 def one_ring(polygons: Sequence[Sequence[float]]) -> NDArray[np.float64]:
-    """The corners (N, 2) of several rings as one: from each to the next leads a line between their nearest corners, and back
-    again, so that the even-odd area stays what it was.
+    """The corners (N, 2) of several rings as one ring. A line between their nearest corners joins each ring to the next and
+    returns, so the even-odd area is unchanged.
     """
     rings = [np.array(polygon, np.float64).reshape(-1, 2) for polygon in polygons]
     joined = rings[0]

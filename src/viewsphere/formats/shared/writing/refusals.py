@@ -13,7 +13,7 @@ from viewsphere.model.sensors.camera import Intrinsics
 
 
 def lenses(scope: Scope) -> Iterator[tuple[str, Intrinsics]]:
-    """The lens of each camera by its sensor's name: those of the rig, or, where nobody knows that, of pictures."""
+    """The lens of each camera by its sensor's name: from the rig or, if that is unknown, from pictures."""
     if scope.rig is not None:
         yield from ((sensor.name, sensor.intrinsics) for sensor in scope.rig.sensors if sensor.lidar is None)
     for sample in scope.pictures:
@@ -22,13 +22,15 @@ def lenses(scope: Scope) -> Iterator[tuple[str, Intrinsics]]:
 
 
 def one_sensor(scope: Scope) -> Iterator[str]:
-    """Of a format whose pictures have no names of sensors."""
+    """Reasons to refuse, for a format without sensor names in its pictures."""
     if scope.rig is not None and len(scope.rig.sensors) > 1:
         yield f"expected one sensor; found {', '.join(sensor.name for sensor in scope.rig.sensors)}"
 
 
 def lacking_labels(scope: Scope, names: Sequence[str]) -> Iterator[str]:
-    """Of a format that is made of these labels: pictures of which none can be computed, as their shots are not kept."""
+    """Reasons to refuse, for a format made of these labels: pictures whose shots are not stored, so that no label can be
+    computed.
+    """
     lacking = missing(names, {*scope.channels, *scope.annotations}) if scope.pictures else ()
     if lacking:
         kept = ", ".join((*scope.channels, *scope.annotations)) or "none"
@@ -36,26 +38,26 @@ def lacking_labels(scope: Scope, names: Sequence[str]) -> Iterator[str]:
 
 
 def known_cameras(scope: Scope) -> Iterator[str]:
-    """Of a format that says by which lens, and from where, pictures were taken."""
+    """Reasons to refuse, for a format that stores each picture's lens and pose."""
     if any(sample.known_camera is None for sample in scope.pictures):
         yield "expected pictures of known cameras; found imported ones"
 
 
 def known_views(scope: Scope) -> Iterator[str]:
-    """Of a format that says from which side a model is seen."""
+    """Reasons to refuse, for a format that stores the viewpoint of a model."""
     seen = (o.view for sample in scope.pictures for o in sample.objects)
     if any(not _has_view(sample) for sample in scope.pictures) or any(math.isnan(view.distance) for view in seen):
         yield "expected pictures of known cameras and viewpoints; found imported ones"
 
 
 def any_camera(scope: Scope) -> Iterator[str]:
-    """Of a format that leaves out pictures of unknown cameras: a data set that has no others."""
+    """Reasons to refuse, for a format that leaves out pictures of unknown cameras: the data set has no other pictures."""
     if scope.pictures and all(sample.known_camera is None for sample in scope.pictures):
         yield from known_cameras(scope)
 
 
 def any_view(scope: Scope) -> Iterator[str]:
-    """Of a format that leaves out pictures of unknown viewpoints: a data set that has no others."""
+    """Reasons to refuse, for a format that leaves out pictures of unknown viewpoints: the data set has no other pictures."""
     if scope.pictures and not any(map(_has_view, scope.pictures)):
         yield from known_views(scope)
 
@@ -65,48 +67,48 @@ def _has_view(sample: Sample) -> bool:
 
 
 def sequences(scope: Scope) -> Iterator[str]:
-    """Of a format of videos."""
+    """Reasons to refuse, for a format of videos."""
     if not scope.is_moving:
         found = "imported pictures, of which nobody knows when they were taken" if scope.pictures else "still pictures"
         yield f"expected sequences (a recipe's time); found {found}"
 
 
 def stereo(scope: Scope) -> Iterator[str]:
-    """Of a format of rectified pairs."""
+    """Reasons to refuse, for a format of rectified pairs."""
     if scope.rig is None or not scope.rig.rectified:
         found = "none" if scope.rig is None else ", ".join(sensor.name for sensor in scope.rig.sensors)
         yield f"expected two rectified cameras (rig: {{kind: stereo, baseline: 0.1}}); found {found}"
 
 
 def pinhole(scope: Scope) -> Iterator[str]:
-    """Of a format without lens distortion."""
+    """Reasons to refuse, for a format without lens distortion."""
     for name, lens in lenses(scope):
         if not lens.lens.is_linear:
             yield f"expected pinhole cameras; found the lens of {name}"
 
 
 def opencv_lenses(scope: Scope) -> Iterator[str]:
-    """Of a format that has OpenCV's lens models alone."""
+    """Reasons to refuse, for a format with only OpenCV's lens models."""
     for name, lens in lenses(scope):
         if lens.lens.opencv is None:
             yield f"expected lenses of OpenCV's models; found {lens.lens.name} of {name}"
 
 
 def most_objects(scope: Scope, most: int) -> Iterator[str]:
-    """Of a format whose numbers of objects end."""
+    """Reasons to refuse, for a format with a limited number of objects."""
     if scope.most_objects > most:
         yield f"expected at most {most:,} objects in a picture; found {scope.most_objects:,}"
 
 
 def most_categories(scope: Scope, most: int) -> Iterator[str]:
-    """Of a format whose numbers of categories end."""
+    """Reasons to refuse, for a format with a limited number of categories."""
     if len(scope.categories) > most:
         yield f"expected at most {most:,} categories; found {len(scope.categories):,}"
 
 
 def plain_names(scope: Scope, allowed: str = r"\S+", told: str = "without spaces") -> Iterator[str]:
-    """Of a format that ends names at spaces, or knows fewer characters: categories' names have to match `allowed`, `told` in
-    words, whole.
+    """Reasons to refuse, for a format that ends names at spaces or allows fewer characters: each category's whole name must
+    match `allowed`, which `told` describes in words.
     """
     for category in scope.categories:
         if not re.fullmatch(allowed, category.name):
@@ -114,14 +116,16 @@ def plain_names(scope: Scope, allowed: str = r"\S+", told: str = "without spaces
 
 
 def no_skew(scope: Scope) -> Iterator[str]:
-    """Of a format whose camera matrices are two focal lengths and a principal point."""
+    """Reasons to refuse, for a format whose camera matrices have two focal lengths and a principal point."""
     for name, lens in lenses(scope):
         if lens.skew:
             yield f"expected cameras without skew; found {lens.skew:g} of {name}"
 
 
 def centred(scope: Scope) -> Iterator[str]:
-    """Of a format whose cameras are an angle of view: pixels are square, and the axis meets the middle of the picture."""
+    """Reasons to refuse, for a format that describes cameras by an angle of view: pixels must be square, and the axis must
+    meet the middle of the picture.
+    """
     for name, k in lenses(scope):
         if (k.cx, k.cy) != (k.width / 2, k.height / 2) or k.fx != k.fy or k.skew:
             yield f"expected square pixels and a principal point in the picture's middle; found others of {name}"

@@ -1,4 +1,6 @@
-"""The shared parts of formats of sequences: the sensors of the left and the right eye, folders of scenes, their ends."""
+"""The shared parts of formats of sequences: the sensors of the left and the right eye, the folders of scenes, and their last
+instants.
+"""
 
 from __future__ import annotations
 
@@ -33,7 +35,7 @@ class Eyes:
         self._rig_of = lru_cache(maxsize=8)(self._read)
 
     def side(self, sample: Sample) -> str:
-        """`left` or `right`; raises UserError for a sensor that is neither."""
+        """`left` or `right`; raises UserError for any other sensor."""
         rig, pair = self._rig(sample), self.pair(sample)
         sides = {rig.sensors[pair.right].name: "right", rig.sensors[pair.left].name: "left"}
         if sample.sensor not in sides:
@@ -41,18 +43,18 @@ class Eyes:
         return sides[sample.sensor]
 
     def pair(self, sample: Sample) -> Pair:
-        """The two eyes of a sample's shot, and the metres between them; of a lone camera twice this, 0 apart."""
+        """The two eyes of a sample's shot, and the metres between them; for a lone camera the same sensor twice, 0 apart."""
         rig = self._rig(sample)
         return rig.rectified[0] if rig.rectified else Pair(0, 0, 0.0)
 
     def numbers(self, sample: Sample) -> tuple[int, int]:
-        """The number of the first sample of a sample's instant in the data set, and that of the instant before."""
+        """The number of the first sample of a sample's instant in the data set, and of the previous instant."""
         assert sample.origin is not None
         first = sample.index - sample.origin.sensor
         return first, first - len(self._rig(sample).sensors)
 
     def lens(self, sample: Sample) -> Intrinsics:
-        """The lens of the left eye in a sample's shot, before it zooms."""
+        """The lens of the left eye in a sample's shot, before any zoom."""
         return self._rig(sample).sensors[self.pair(sample).left].intrinsics
 
     def _rig(self, sample: Sample) -> Rig:
@@ -68,21 +70,21 @@ class Eyes:
 
 
 def check_whole(dataset: Dataset, name: str) -> None:
-    """Raise UserError where instants of one sequence are of several splits."""
+    """Raise UserError if the instants of one sequence belong to several splits."""
     parts = [part.recipe.get("splits", {}) for part in dataset.plan.parts]
     if len(dataset.splits) > 1 and any(splits.get("by") == "frame" for splits in parts):
         raise UserError(f"{name}: expected splits that keep sequences whole; found splits.by: frame: split by sequence")
 
 
 def scene(sample: Sample) -> str:
-    """The name of a sample's sequence, as a folder's; raises StoreError for one that a folder cannot have."""
+    """The name of a sample's sequence, as a folder name. Raises StoreError for a name that a folder cannot have."""
     if not is_name(sample.sequence):
         raise StoreError(f"frame {sample.index}: expected a sequence's name without /; found {sample.sequence!r:.100}")
     return sample.sequence
 
 
 def instants(dataset: Dataset, sample: Sample) -> int:
-    """Number of the instants of a sample's sequence, as it is planned; raises UserError for a still picture."""
+    """Planned number of instants of a sample's sequence. Raises UserError for a still picture."""
     time = dataset.plan.parts[dataset.plan.part_of(sample.index)].recipe.get("time")
     if not time:
         raise UserError(f"frame {sample.index}: expected a picture of a sequence; found a still one: export sequences apart")
@@ -90,5 +92,7 @@ def instants(dataset: Dataset, sample: Sample) -> int:
 
 
 def number(value: int, count: int, digits: int = 4) -> str:
-    """A number of at least so many digits, and of as many as the largest of `count` has, so that names sort as numbers do."""
+    """A number with at least this many digits, and as many as the largest of `count` numbers, so that names sort like
+    numbers.
+    """
     return f"{value:0{max(digits, len(str(count)))}d}"

@@ -1,4 +1,4 @@
-"""The sequences of a data set, as its plan has them: their numbers, first samples and shots, without a list of all samples."""
+"""The sequences of a data set, from its plan: their numbers, first samples and shots, without a list of all samples."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ from viewsphere.store.index import Block
 KNOWN = "shots with their rigs, which imported and merged data sets do not have"
 
 SHOTS = 4
-"""Shots that are kept for those who ask again."""
+"""Number of shots to cache."""
 
 
 @dataclass(frozen=True)
 class Course:
-    """One sequence: its number in the plan, from 0; its samples, [first, stop); how many instants were asked for, and how many
-    samples each of them has.
+    """One sequence: its number in the plan, from 0; its samples, [first, stop); the requested number of instants, and the
+    number of samples in each.
     """
 
     number: int
@@ -35,13 +35,13 @@ class Course:
 
 
 def unknown_shots(scope: Scope) -> Iterator[str]:
-    """Of a format that has to know how sensors are mounted."""
+    """Reasons to refuse, for a format that requires the mounts of sensors."""
     if scope.rig is None:
         yield f"expected {KNOWN}; found none"
 
 
 class Timeline:
-    """The sequences of a data set, chosen or not."""
+    """All sequences of a data set, including those that are not chosen."""
 
     def __init__(self, dataset: Dataset) -> None:
         self._dataset = dataset
@@ -50,7 +50,7 @@ class Timeline:
         self._labelled = lru_cache(maxsize=SHOTS)(dataset.labelled)
 
     def course(self, sample: Sample) -> Course:
-        """The sequence that a sample is of; raises UserError for a still picture."""
+        """The sequence of a sample. Raises UserError for a still picture."""
         place = bisect_right(self._firsts, sample.index) - 1
         run = self._runs[place] if place >= 0 else None
         if run is None or not sample.sequence or sample.index >= run.first + run.block.samples:
@@ -68,11 +68,11 @@ class Timeline:
         return Course(number, first, stop, run.instants, run.block.each)
 
     def shot(self, sample: Sample) -> Shot | None:
-        """The shot that a sample is of; None for an imported picture, or one of a merged data set."""
+        """The shot of a sample; None for a picture that is imported or from a merged data set."""
         return None if sample.origin is None else self._labelled(sample.origin.key)
 
     def taken(self, sample: Sample) -> tuple[Shot, int, int]:
-        """The shot that a sample is of, and its instant and its sensor there; raises UserError where nobody knows it."""
+        """The shot of a sample, with the sample's instant and sensor in it. Raises UserError if the shot is unknown."""
         shot = self.shot(sample)
         if shot is None or sample.origin is None:
             raise UserError(f"frame {sample.index}: expected {KNOWN}; found none")
@@ -94,13 +94,13 @@ class Timeline:
         return not any(map(self.has, range(sample.index - course.each, course.first - 1, -course.each)))
 
     def has(self, index: int) -> bool:
-        """Return whether a sample is there: finished, and chosen."""
+        """Return whether a sample is available: finished and chosen."""
         place = bisect_right(self._there, index, key=lambda span: span[0]) - 1
         return place >= 0 and index < self._there[place][1]
 
     @cached_property
     def _there(self) -> list[tuple[int, int]]:
-        """The samples that are there, as ranges [first, stop): one where all are."""
+        """The available samples as ranges [first, stop); a single range if all samples are available."""
         found: list[tuple[int, int]] = []
         for key, places in self._dataset.shots():
             row = self._dataset.plan.find(key)
@@ -114,8 +114,8 @@ class Timeline:
 
 @dataclass(frozen=True)
 class _Run:
-    """A block of the plan whose subjects are a sequence each, or which continues one; its first sample, and the number of its
-    first sequence.
+    """A block of the plan that continues a sequence or whose subjects are one sequence each; its first sample, and the number
+    of its first sequence.
     """
 
     block: Block
@@ -125,7 +125,7 @@ class _Run:
 
 
 def _runs(plan: PlanRecord) -> list[_Run]:
-    """Of merged data sets that were not whole, a block has what one shot has of a sequence."""
+    """The runs of a plan. In merged data sets that were incomplete, a block holds one shot's part of a sequence."""
     found: list[_Run] = []
     number, last = 0, None
     for place, part in enumerate(plan.parts):

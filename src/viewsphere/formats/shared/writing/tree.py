@@ -1,6 +1,6 @@
-"""The form of most formats: a tree of files. Every sample gives some files whole, and parts of others.
+"""The form of most formats: a tree of files. Every sample adds some whole files, and parts of other files.
 
-A format's module has a class of its own, below `Tree`, and gets its functions from this class:
+A format's module defines a subclass of `Tree` and derives its functions from it:
 
     preparer, writer, verify = functions(Yolo)
 """
@@ -28,7 +28,7 @@ from viewsphere.scratch import temporary
 from viewsphere.store import Dataset
 
 FOLDER_SIZE = 10_000
-"""Most files of a folder, where a format does not say otherwise."""
+"""Greatest number of files in a folder, unless a format sets another one."""
 
 
 @dataclass(frozen=True)
@@ -41,8 +41,8 @@ class File:
 
 @dataclass(frozen=True)
 class Piece:
-    """The next bytes of a section of a file that many samples, or all, have parts in; `between` stands before all but the
-    first. `count`: how many of what the section holds they are.
+    """The next bytes of a section of a file to which many or all samples contribute. `between` precedes all pieces but the
+    first. `count`: the number of the section's items in these bytes.
     """
 
     path: str
@@ -53,7 +53,7 @@ class Piece:
 
 
 def line(path: str, *values: object) -> Piece:
-    """A line of words and numbers with spaces between; floats in as many digits as they need to be read back equal."""
+    """A line of words and numbers separated by spaces; floats have enough digits to be read back exactly."""
     return Piece(path, (" ".join(map(str, values)) + "\n").encode())
 
 
@@ -76,15 +76,15 @@ OBJECT: Layout = (b"{\n", "", b"\n}\n")
 
 
 class Tree(ABC):
-    """The files that a format makes of a data set; each format has a class below it. Some errors of the data set are known only
-    while it writes. They are raised as UserError, and leave nothing written.
+    """The files that a format makes from a data set; each format defines a subclass. Some errors of the data set only appear
+    during writing. They are raised as UserError, and leave no files.
     """
 
     def __init__(self, dataset: Dataset, *options: Any) -> None:
         self.dataset = dataset
 
     def stem(self, sample: Sample) -> str:
-        """A path for what is of one sample, `<split>/<index>`, without an ending; large data sets have numbered folders
+        """A path for the files of one sample, `<split>/<index>`, without an ending; large data sets have numbered folders
         between.
         """
         folder = self.dataset.plan.folder_of(sample.index, FOLDER_SIZE)
@@ -110,7 +110,7 @@ class Tree(ABC):
 
 
 class Functions(NamedTuple):
-    """The functions that a format's module gets from a tree: see `viewsphere.plugins.format.FormatSpec`."""
+    """The functions that a format's module derives from a tree: see `viewsphere.plugins.format.FormatSpec`."""
 
     preparer: Callable[..., Callable[[Sample], list[Piece]]]
     writer: Callable[..., Any]
@@ -118,7 +118,7 @@ class Functions(NamedTuple):
 
 
 def functions(kind: type[Tree]) -> Functions:
-    """The functions of a format that is this tree."""
+    """The functions of the format of this tree."""
 
     def preparer(dataset: Dataset, folder: Path, *options: Any) -> Callable[[Sample], list[Piece]]:
         tree = kind(dataset, *options)
@@ -161,7 +161,7 @@ def functions(kind: type[Tree]) -> Functions:
 
 @contextmanager
 def _lacking_told(tree: Tree, sample: Sample) -> Generator[None]:
-    """Raises UserError for a channel, or a label of objects, that the sample lacks, as those of imported data sets may."""
+    """Convert a missing channel or object label, which imported data sets may lack, into UserError."""
     try:
         yield
     except KeyError as error:
@@ -189,7 +189,7 @@ def _expected(tree: Tree, add: Callable[[list[Piece]], None]) -> Iterator[Expect
 
 @contextmanager
 def _collecting(tree: Tree, folder: Path) -> Generator[_Collected]:
-    """Collects pieces, and puts their files together at the end."""
+    """Collect pieces, and assemble their files at the end."""
     with temporary("pieces") as scratch_folder:
         collected = _Collected(scratch_folder)
         yield collected
@@ -210,14 +210,14 @@ def _assemble(tree: Tree, path: str, sections: Mapping[str, _Section], file: Pat
 
 @dataclass
 class _Section:
-    """The pieces of a section, one after another, and how many things they are."""
+    """The pieces of a section, one after another, and their number of items."""
 
     file: Path
     count: int = 0
 
 
 class _Collected:
-    """Pieces in the order in which they come, on the disk, by file and section."""
+    """Pieces in the order of their arrival, on disk, by file and section."""
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder
