@@ -60,8 +60,7 @@ ORDER = (np.eye(3), *np.eye(9).reshape(9, 3, 3))
 
 
 def _turned(pose: Float, axes: tuple[Continuous, ...]) -> Float:
-    """The pose after the best turn around an axis. A ball, which no rotation changes, gets the identity as its rotation.
-    """
+    """The pose after the best turn around an axis. A ball, which no rotation changes, gets the identity as its rotation."""
     if is_ball(axes):
         offset = np.array(axes[0].offset)
         return rigid(np.eye(3), product(pose[:3, :3], offset[:, None])[:, 0] + pose[:3, 3] - offset)

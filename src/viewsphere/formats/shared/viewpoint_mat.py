@@ -76,8 +76,7 @@ def _oblong(lens: Intrinsics) -> str:
 
 
 def scipy_io(name: str) -> Any:
-    """Return the module that writes .mat files. Raises MissingExtraError, with the format's name, if it is not installed.
-    """
+    """Return the module that writes .mat files. Raises MissingExtraError, with the format's name, if it is not installed."""
     try:
         from scipy import io
     except ImportError:

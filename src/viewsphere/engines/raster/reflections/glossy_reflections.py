@@ -72,9 +72,7 @@ def mirror_in_polish(baked: Baked, camera: Camera, visibility: Visibility, radia
 def _mirror(baked: Baked, camera: Camera, visibility: Visibility) -> tuple[NDArray[np.intp], float]:
     """Pixels (n,) of the level surface below the camera that covers most pixels, and its height."""
     shown = visibility.triangle.reshape(-1)
-    polished = (
-        baked.surfaces.looks[:, L_ROUGH] + baked.surfaces.looks[:, L_ROUGH_TEXEL] < MATT
-    )  # before any texture reduces it
+    polished = baked.surfaces.looks[:, L_ROUGH] + baked.surfaces.looks[:, L_ROUGH_TEXEL] < MATT  # before any texture reduces it
     is_level = (np.abs(baked.surfaces.normals[:, 2]) > LEVEL) & (baked.kind[:-1] == kernels_paint.SOLID)
     is_level &= polished[baked.surfaces.material]
     at = np.flatnonzero((shown >= 0) & is_level[shown])

@@ -43,8 +43,7 @@ def lying(geometry: Geometry, height: float) -> NDArray[np.bool_]:
 
 
 def looked_at(camera: Camera, visibility: Visibility, at: NDArray[np.intp]) -> tuple[Float, Float]:
-    """Cosines (n,) of the angles between these pixels' rays and the vertical, and the world places (n, 3) where the rays end.
-    """
+    """Cosines (n,) of the angles between these pixels' rays and the vertical, and the world places (n, 3) where the rays end."""
     rays, camera_from_pixel = lens_rays(camera), inverse_camera_matrix(camera.intrinsics)
     table = np.zeros((0, 3)) if rays is None else rays.reshape(-1, 3)
     table.setflags(write=False)  # same type as for a lens, for one compilation
@@ -74,8 +73,7 @@ def mirrored(baked: Baked, camera: Camera, plane: float, left_out: NDArray[np.bo
 
 
 def _without(geometry: Geometry, left_out: NDArray[np.bool_]) -> Geometry:
-    """The geometry without these triangles (T,), and with all others visible from both sides, because a mirror is not a camera.
-    """
+    """The geometry without these triangles (T,), and with all others visible from both sides, because a mirror is not a camera."""
     return replace(with_both_sides(geometry), triangle_cutout=np.where(left_out, np.int32(NEVER), geometry.triangle_cutout))
 
 

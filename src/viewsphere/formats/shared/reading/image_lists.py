@@ -30,8 +30,7 @@ SPLITS = TRAIN, VAL, TEST = ("train", "val", "test")
 
 @dataclass(frozen=True)
 class Listed:
-    """A picture of a split: its name in the data set, its size as shown, and its label files (None for a missing one).
-    """
+    """A picture of a split: its name in the data set, its size as shown, and its label files (None for a missing one)."""
 
     split: str
     name: str
