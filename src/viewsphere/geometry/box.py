@@ -27,7 +27,9 @@ def overlap(a: Bounds, b: Bounds) -> bool:
 
 
 def is_behind(camera: Camera, bounds: Float) -> bool:
-    """Return whether a world box (2, 3), given by its lowest and highest corners, has no part in front of a pinhole's z = NEAR."""
+    """Return whether a world box (2, 3), given by its lowest and highest corners, has no part in front of a pinhole's z =
+    NEAR.
+    """
     terms = camera.R[2] * bounds
     farthest = float(terms.max(axis=0).sum() + camera.t[2])
     return farthest + ROUNDING * (1 + float(np.abs(terms).max())) < NEAR

@@ -30,7 +30,9 @@ UNKNOWN = 3
 
 
 def occlusion(kept: None, placement: Placement, o: ObjectAnnotation) -> Mapping[str, Any]:
-    """The grade for visibility and truncation. It counts only pixels in the image; pixels outside count as KITTI's truncation."""
+    """The grade for visibility and truncation. It counts only pixels in the image; pixels outside count as KITTI's
+    truncation.
+    """
     if o.truncation >= 1:
         return {"occlusion_level": UNKNOWN}
     hidden = 1 - o.visibility / (1 - o.truncation)

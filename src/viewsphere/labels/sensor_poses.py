@@ -45,7 +45,9 @@ def prove(sample: Sample, models: Models) -> Iterator[str]:
 
 
 def draw(pen: ImageDraw, sample: Sample, scale: float) -> None:
-    """A small map in the lower right corner, with the picture's own sensor in white, and the axes of the other visible sensors."""
+    """A small map in the lower right corner, with the picture's own sensor in white, and the axes of the other visible
+    sensors.
+    """
     own = np.abs(sample.camera_from_sensors - np.eye(4)).max(axis=(1, 2)).argmin()
     poses = [(pose, OWN if i == own else color_of(i + 1)) for i, pose in enumerate(sample.camera_from_sensors)]
     inset(pen, sample, scale, poses, at_right=True)

@@ -32,7 +32,9 @@ WORST = 4
 
 
 def compute(context: LabelContext) -> NDArray[np.void]:
-    """One row per point, (N,) of `viewsphere.model.annotations.tracks.TRACK`. Raises ValueError if the shot follows no points."""
+    """One row per point, (N,) of `viewsphere.model.annotations.tracks.TRACK`. Raises ValueError if the shot follows no
+    points.
+    """
     followed = context.get(FollowedPoints())  # first, because its triangles may overwrite a view's
     own = context.own_view
     if own is None or followed is None:

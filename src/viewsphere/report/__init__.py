@@ -141,7 +141,9 @@ def _models(dataset: Dataset, table: FrameTable, tell: Listener) -> list[dict[st
 
 
 def model_data(dataset: Dataset, info: ModelInfo, table: FrameTable, most: int = MOST_TRIANGLES) -> dict[str, Any]:
-    """A model's mesh of at most `most` triangles, or the reason why there is none, and the cameras that saw it, as plain data."""
+    """A model's mesh of at most `most` triangles, or the reason why there is none, and the cameras that saw it, as plain
+    data.
+    """
     try:
         with here(dataset.path(info.glb)) as file:
             shape = {"mesh": mesh_data(read_small(file, most, info.node)), "problem": None}

@@ -53,7 +53,9 @@ def check_skies(work: Missing, tell: Listener) -> tuple[str, ...]:
 def render_part(
     work: Missing, pool: WorkerPool, keep_going: bool, tell: Listener, pulse: HeartbeatWriter
 ) -> tuple[int, dict[str, str]]:
-    """Make the part's models, add the part to the data set and render its shots; returns the frames made and what was left out."""
+    """Make the part's models, add the part to the data set and render its shots; returns the frames made and what was left
+    out.
+    """
     portion, store = work.portion, work.store
     if portion.number:
         store.drop_unnamed_models()  # from an append that stopped before its part was added

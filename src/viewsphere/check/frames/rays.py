@@ -148,7 +148,9 @@ class RayCaster:
         return abs(eye[2] - self._lowest) <= EDGE_ON * (1.0 + float(np.linalg.norm(eye + self._middle)))
 
     def _meets_ground(self, eye: Float, directions: Float, ahead: NDArray[np.bool_]) -> NDArray[np.bool_]:
-        """Return a mask of the rays that certainly meet the ground; not all files store the depth of rays that point backwards."""
+        """Return a mask of the rays that certainly meet the ground; not all files store the depth of rays that point
+        backwards.
+        """
         height = eye[2] - self._lowest
         steep = np.abs(directions[:, 2]) > LEVEL
         return ahead & steep & (directions[:, 2] * height < 0) & (abs(height) > LEVEL) & self._has_ground

@@ -103,7 +103,9 @@ def _bytes(rows: NDArray[Any]) -> NDArray[np.uint8]:
 
 
 def _beyond(kept: NDArray[Any], again: NDArray[Any], step: float) -> NDArray[np.bool_]:
-    """A mask (H, W) of depths stored in whole steps that are not the nearest step; depth behind the camera is stored as empty."""
+    """A mask (H, W) of depths stored in whole steps that are not the nearest step; depth behind the camera is stored as
+    empty.
+    """
     seen = np.isfinite(again) & (again > 0)
     rounded = np.clip(np.rint(np.where(seen, again, 1.0).astype(np.float64) / step), 1, MOST_STEPS)
     return np.where(seen, kept != (rounded * step).astype(np.float32), np.isfinite(kept))

@@ -36,7 +36,9 @@ from viewsphere.truth.raster.geometry import Geometry, with_blended_colors
 
 @dataclass(frozen=True, eq=False)
 class Packed:
-    """The materials and surfaces of arranged things. kind, owner, see_through, blended: see `Baked`; maps: those of a sequence."""
+    """The materials and surfaces of arranged things. kind, owner, see_through, blended: see `Baked`; maps: those of a
+    sequence.
+    """
 
     arranged: Arranged
     lengths: Lengths

@@ -43,7 +43,9 @@ def _is_alike(way, row, column, u, v):
 
 @njit(_nrt=True)
 def find_longest(way, tiles):
-    """Fill tiles (m, n, 2) with the longest way (H, W, 2) among the pixels of each square of TILE x TILE and of its neighbours."""
+    """Fill tiles (m, n, 2) with the longest way (H, W, 2) among the pixels of each square of TILE x TILE and of its
+    neighbours.
+    """
     own = np.zeros_like(tiles)
     for y in range(way.shape[0]):
         for x in range(way.shape[1]):

@@ -36,7 +36,9 @@ class Options:
         return max(math.isqrt(self.antialias // 4), 1)
 
     def for_width(self, pixels: int) -> int:
-        """Width of the shadow maps for pictures whose longer side has this many pixels: the next power of two, 1,024 to 4,096."""
+        """Width of the shadow maps for pictures whose longer side has this many pixels: the next power of two, 1,024 to
+        4,096.
+        """
         return self.shadow_resolution or min(max(1 << (pixels - 1).bit_length(), 1024), 4096)
 
 

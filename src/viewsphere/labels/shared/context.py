@@ -238,7 +238,9 @@ class LabelContext:
         return np.empty(shape if components == 1 else (*shape, components), dtype)
 
     def per_triangle(self, table: NDArray[np.int32], empty: int) -> NDArray[np.int32]:
-        """An int32 channel: the table's number for the seen triangle, 0 beyond the table's end, `empty` where nothing is seen."""
+        """An int32 channel: the table's number for the seen triangle, 0 beyond the table's end, `empty` where nothing is
+        seen.
+        """
         from viewsphere.truth.raster import kernels_channels as kernels
 
         out = self.empty(np.int32)

@@ -177,7 +177,9 @@ class _Worker(WorkerProcess):
 
 
 def _serve(pipe: Connection, root: Path, portion: DatasetPart) -> None:
-    """The loop of a worker: receive a job, report the number of finished frames, send the answer; ends when the parent is gone."""
+    """The loop of a worker: receive a job, report the number of finished frames, send the answer; ends when the parent is
+    gone.
+    """
     belong_to_parent()
     spare_imports()
     with importing():

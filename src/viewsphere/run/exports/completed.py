@@ -55,7 +55,9 @@ def lacking(dataset: Dataset, spec: FormatSpec, entry: FormatEntry) -> tuple[str
 
 
 class Completed(Exported):
-    """A data set whose samples also have the named labels, without annotations of objects whose visibility is at most `least`."""
+    """A data set whose samples also have the named labels, without annotations of objects whose visibility is at most
+    `least`.
+    """
 
     def __init__(
         self, root: str | os.PathLike[str], choice: Choice | None, least: float | None, names: tuple[str, ...]

@@ -209,7 +209,9 @@ def _sequence(shot: Shot, first: Instant, things: tuple[Thing, ...]) -> dict[str
 
 
 def _mark(small: Shot) -> str:
-    """The cache entry that marks this shot's kernels as compiled; its name depends on their sources and on the shot's features."""
+    """The cache entry that marks this shot's kernels as compiled; its name depends on their sources and on the shot's
+    features.
+    """
     scene = _outline(small.model_dump(mode="json", exclude={"engine_options"}))
     used = json.dumps([scene, small.engine_options], sort_keys=True)
     engine = engine_digest(small.engine)

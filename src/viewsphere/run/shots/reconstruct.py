@@ -89,7 +89,9 @@ class ViewReconstructor:
         return shot and _Made(shot, self._scenery.around(key))
 
     def _joined(self, key: str) -> _Made | None:
-        """A shot of a sequence with the last instant of the previous shot and the first instant of the next, if it lacks them."""
+        """A shot of a sequence with the last instant of the previous shot and the first instant of the next, if it lacks
+        them.
+        """
         made, row = self._made(key), self._dataset.plan.find(key)
         if made is None or row is None or not made.shot.sequence:
             return made

@@ -52,7 +52,9 @@ class Match:
 
     @property
     def xy(self) -> Float:
-        """Positions in the other view, (H, W, 2), in pixels; NaN if there is none, and the pixel's own centre if nothing moved."""
+        """Positions in the other view, (H, W, 2), in pixels; NaN if there is none, and the pixel's own centre if nothing
+        moved.
+        """
         return self.placed.xy
 
     @cached_property

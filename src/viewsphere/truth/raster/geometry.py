@@ -443,7 +443,9 @@ def _offset(parts: Sequence[NDArray[np.int32]], firsts: Sequence[int]) -> NDArra
 
 
 def _offset_triangles(parts: Sequence[NDArray[np.int32]], firsts: Sequence[int]) -> NDArray[np.int32]:
-    """Triangles (T, 3) of parts whose vertices begin at `firsts`, overwritten in place because a thousand instances are large."""
+    """Triangles (T, 3) of parts whose vertices begin at `firsts`, overwritten in place because a thousand instances are
+    large.
+    """
     triangles = np.empty((sum(map(len, parts)), 3), np.int32)
     stop = 0
     for part, first in zip(parts, firsts, strict=False):

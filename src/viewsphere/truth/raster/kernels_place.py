@@ -46,7 +46,9 @@ def turn(m, own, normals):
 
 @njit
 def bound(m, own, is_used, bounds):
-    """Fill bounds (2, 3) with the lowest and the highest world coordinates of a mesh's used vertices, infinite if none is used."""
+    """Fill bounds (2, 3) with the lowest and the highest world coordinates of a mesh's used vertices, infinite if none is
+    used.
+    """
     for r in range(3):
         bounds[0, r], bounds[1, r] = np.inf, -np.inf
     for i in range(own.shape[0]):

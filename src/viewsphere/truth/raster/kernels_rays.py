@@ -70,7 +70,9 @@ def build_tree(rays, levels):
 
 @inner
 def _on_face(face, x, y, z):
-    """The projection on a cube's face (0 to 5: +z, -z, +x, -x, +y, -y) and the distance along its axis; not positive if behind."""
+    """The projection on a cube's face (0 to 5: +z, -z, +x, -x, +y, -y) and the distance along its axis; not positive if
+    behind.
+    """
     sign = 1.0 - 2.0 * (face % 2)
     if face < 2:
         return x / (sign * z), y / (sign * z), sign * z

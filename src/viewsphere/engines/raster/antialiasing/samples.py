@@ -280,7 +280,9 @@ class _Points:
 
 
 def _differs_from_neighbour(triangle: Int32, depth: Float32, owner: Int32, normals: Float32) -> NDArray[np.uint8]:
-    """Pixels that look different from the neighbour beside, above or below: uint8, in order, padded to whole words of 8 bytes."""
+    """Pixels that look different from the neighbour beside, above or below: uint8, in order, padded to whole words of 8
+    bytes.
+    """
     height, width = triangle.shape
     beside, above = np.empty((2, height * width + 8), np.uint8)
     room, owners = np.zeros((8, width + 16), np.float32), np.zeros((4, width + 16), np.int32)

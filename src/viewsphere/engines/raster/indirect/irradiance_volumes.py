@@ -225,7 +225,9 @@ def _points(grid: Grid) -> tuple[Float32, Int32, Int32]:
 
 
 def _opens(grid: Grid, tree: Tree, points: Float32, own: Int32, buried: NDArray[np.uint8]) -> Float32:
-    """Return whether the way between each probe and the next along x, y and z is free, and neither is buried: (3, N), by place."""
+    """Return whether the way between each probe and the next along x, y and z is free, and neither is buried: (3, N), by
+    place.
+    """
     shape = grid.shape
     at = np.indices(tuple(shape.tolist())).reshape(3, -1)[::-1]
     opens = np.empty((3, len(points)), np.float32)

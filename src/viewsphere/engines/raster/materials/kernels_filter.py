@@ -267,7 +267,9 @@ def mix(texels, count, first_plane, planes, q, places, c):
 
 @inner(fastmath=FAST)
 def opacity(surfaces, textures, m, u0, v0, u1, v1):
-    """Alpha of a material's base colour texture at coordinates in both uv sets: the alpha of the nearest texel, as for labels."""
+    """Alpha of a material's base colour texture at coordinates in both uv sets: the alpha of the nearest texel, as for
+    labels.
+    """
     for n in range(U(surfaces.bundles.shape[1])):
         if surfaces.bundles[m, n] < 0:
             break

@@ -73,7 +73,9 @@ def mirrored(baked: Baked, camera: Camera, plane: float, left_out: NDArray[np.bo
 
 
 def _without(geometry: Geometry, left_out: NDArray[np.bool_]) -> Geometry:
-    """The geometry without these triangles (T,), and with all others visible from both sides, because a mirror is not a camera."""
+    """The geometry without these triangles (T,), and with all others visible from both sides, because a mirror is not a
+    camera.
+    """
     return replace(with_both_sides(geometry), triangle_cutout=np.where(left_out, np.int32(NEVER), geometry.triangle_cutout))
 
 

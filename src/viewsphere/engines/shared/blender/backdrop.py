@@ -102,7 +102,9 @@ def _smooth(x: Float) -> Float:
 
 
 def veil(picture: Float32, fog: Fog, camera: Camera, geometry: Geometry, is_outdoors: bool = False) -> None:
-    """Apply fog in place to a picture (H, W, 4), premultiplied, without its sky; fog that `is_outdoors` covers only the ground."""
+    """Apply fog in place to a picture (H, W, 4), premultiplied, without its sky; fog that `is_outdoors` covers only the
+    ground.
+    """
     seen = rasterize(geometry, camera, subdivision=2)
     rays = pixel_rays(camera.intrinsics, 2).reshape(-1, 3)
     depth = Air.of(fog, camera, rays).depth(seen.inverse_depth.reshape(-1))

@@ -96,7 +96,9 @@ def _view(camera: Camera, face: Float, pixels: NDArray[np.int64], rays: Float) -
 
 
 def resampled(camera: Camera, views: Sequence[PinholeView], pictures: Sequence[Float32], mixed: bool = True) -> Float32:
-    """The lens's picture (H, W, C) float32, bilinear, or from the nearest pixels if not `mixed`; empty in pixels without a ray."""
+    """The lens's picture (H, W, C) float32, bilinear, or from the nearest pixels if not `mixed`; empty in pixels without a
+    ray.
+    """
     channels = pictures[0].shape[2]
     out = np.zeros((camera.height * camera.width, channels), np.float32)
     for view, picture in zip(views, pictures, strict=True):

@@ -32,7 +32,9 @@ class BentLens(NamedTuple):
 def bent_bounds(
     bent: BentLens, R: Float, t: Float, vertices: Float, is_used: NDArray[np.bool_], triangles: NDArray[np.int32]
 ) -> tuple[Bounds | None, bool]:
-    """The result of `viewsphere.geometry.lenses.Lens.bounds`, to 1e-5 px; triangles that cross the lens's limit are cut there."""
+    """The result of `viewsphere.geometry.lenses.Lens.bounds`, to 1e-5 px; triangles that cross the lens's limit are cut
+    there.
+    """
     from viewsphere.geometry.lenses.shared import kernels_bent
 
     own = (bent.is_fisheye, bent.coefficients, bent.limit)

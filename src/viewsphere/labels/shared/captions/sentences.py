@@ -169,7 +169,9 @@ Phrase = tuple[ObjectAnnotation, str, Words]
 
 
 def related(first: Phrase, relation: str, second: Phrase) -> str:
-    """The sentence that states an object's relation to another object. If both have the same phrase, the second gets `another`."""
+    """The sentence that states an object's relation to another object. If both have the same phrase, the second gets
+    `another`.
+    """
     (one, phrase, own), (other, landmark, its) = first, second
     is_alike = noun_of(one.category) == noun_of(other.category) and set(its) <= {*own, ""}
     return capital(f"{with_article(phrase)} is {relation} {f'another {landmark}' if is_alike else with_article(landmark)}.")
