@@ -59,7 +59,9 @@ def orbit_angles(rotation: ArrayLike) -> tuple[float, float, float]:
 
 
 def focal_from_sensor(focal: float, sensor: float, extent: float) -> float:
-    """Focal length in pixels from the lens' focal length and the sensor's size along `extent` pixels (both in the same unit)."""
+    """Focal length in pixels from the lens' focal length and the sensor's size along `extent` pixels (both in
+    the same unit).
+    """
     return focal / sensor * extent
 
 

@@ -303,7 +303,9 @@ class NeighbourViews:
         return Turning(rotation, -product(rotation, placed[:, :3, 3:])[..., 0], moved)
 
     def _poses(self, poses: Sequence[Matrix4 | None], moments: Float) -> Float:
-        """Poses (n, 4, 4), at moments (n,) in seconds from the instant, interpolated from these poses at the shot's instants."""
+        """Poses (n, 4, 4), at moments (n,) in seconds from the instant, interpolated from these poses at the
+        shot's instants.
+        """
         shot, now = self.views.shot, poses[self.instant]
         assert now is not None
         known = {offset: shot.instant_after(self.instant, offset) for offset in (-1, 1)}

@@ -22,7 +22,9 @@ SHARE_TOLERANCE = 1e-4
 
 
 def files(sample: Sample) -> Iterator[str]:
-    """Every channel's file belongs to the frame, exists, and contains an array of the image's size; passes have valid values."""
+    """Every channel's file belongs to the frame, exists, and contains an array of the image's size; passes have
+    valid values.
+    """
     height, width = sample.height, sample.width
     for name, file in sample.files.items():
         if file.split("/")[-2:] != [name, f"{sample.index:08d}{PurePosixPath(file).suffix}"]:

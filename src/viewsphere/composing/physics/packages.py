@@ -9,7 +9,9 @@ from viewsphere.errors import MissingExtraError
 
 
 def check_packages(packages: Iterable[str], extra: str, what: str) -> None:
-    """Check that an extra's packages are installed, without importing them; raises MissingExtraError that begins with `what`."""
+    """Check that an extra's packages are installed, without importing them; raises MissingExtraError that
+    begins with `what`.
+    """
     missing = [name for name in packages if find_spec(name) is None]
     if missing:
         names, are = " and ".join(missing), "is" if len(missing) == 1 else "are"

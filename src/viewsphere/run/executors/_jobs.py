@@ -21,7 +21,9 @@ MOST_DEATHS = 16
 
 
 class Work(Protocol):
-    """The jobs of a run, grouped in lines: jobs of one line share the warm caches of a worker. Jobs are generated one by one."""
+    """The jobs of a run, grouped in lines: jobs of one line share the warm caches of a worker. Jobs are
+    generated one by one.
+    """
 
     def lines(self) -> Iterable[tuple[str, int]]:
         """The name of each line, and the approximate number of its jobs."""

@@ -244,7 +244,9 @@ class _Actor:
         self._is_compiled = False
 
     def ready(self) -> None:
-        """Start. Raises StoreError for a machine without the data set, or whose viewsphere would render a different data set."""
+        """Start. Raises StoreError for a machine without the data set, or whose viewsphere would render a
+        different data set.
+        """
         from viewsphere.run.opening import check_whether_same
         from viewsphere.run.shots.tasks import Worker
         from viewsphere.run.workers.allocator import keep_freed_memory

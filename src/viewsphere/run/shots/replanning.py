@@ -56,7 +56,9 @@ class Replanned:
         return found
 
     def portion(self, number: int) -> DatasetPart:
-        """A part with its recipe's plan. It reads the part's stored simulations and stores no new ones; errors as for `plan`."""
+        """A part with its recipe's plan. It reads the part's stored simulations and stores no new ones; errors
+        as for `plan`.
+        """
         if number not in self._portions:
             found = resumed(self.plan(number), self.record, number)
             memory = Simulated(self.store.root, writes=False)

@@ -1,4 +1,6 @@
-"""The rigid motions of things between two views: one matrix per thing maps pixels and 1/s of one view to pixels of the other."""
+"""The rigid motions of things between two views: one matrix per thing maps pixels and 1/s of one view to pixels
+of the other.
+"""
 
 from __future__ import annotations
 

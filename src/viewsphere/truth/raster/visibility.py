@@ -283,7 +283,9 @@ class RayTable:
 
 
 def _canvas(camera: Camera, window: Window) -> Window:
-    """The rectangle of pixels to tabulate for this window, chosen from a few, so that a table serves many windows and frames."""
+    """The rectangle of pixels to tabulate for this window, chosen from a few, so that a table serves many
+    windows and frames.
+    """
     w, h = camera.width, camera.height
     image, around = (0, 0, w, h), (-w, -h, 2 * w, 2 * h)
     if _within(window, image):

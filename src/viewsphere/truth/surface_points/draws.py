@@ -56,7 +56,9 @@ def _triangles(view: View, things: Sequence[int]) -> NDArray[np.int64]:
 def _evenly(
     view: View, triangles: NDArray[np.int64], places: NDArray[np.floating], count: int, rng: np.random.Generator
 ) -> Drawn:
-    """`count` points on triangles whose vertices are at these places; fewer if the triangles have no surface, or almost none."""
+    """`count` points on triangles whose vertices are at these places; fewer if the triangles have no surface,
+    or almost none.
+    """
     picked, weights = np.zeros(0, np.int64), np.zeros((0, 3))
     corners = places[view.geometry.triangles[triangles]].astype(np.float64)
     x, y, z = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]).T

@@ -300,7 +300,9 @@ def _draw_solid(surface, edges, found, count, points, solid):
 
 @inner
 def _is_before(inverse, t, old, seen):
-    """Return whether triangle t is visible instead of triangle `seen`. Truth, which draws in order, decides only by `NEARER`."""
+    """Return whether triangle t is visible instead of triangle `seen`. Truth, which draws in order, decides
+    only by `NEARER`.
+    """
     return (inverse > old * NEARER) | ((t < seen) & (inverse * NEARER >= old))
 
 

@@ -215,7 +215,9 @@ def _rows(context, builder, signature, arguments, count):
 
 
 def _strict(lanes):
-    """Exact comparison of lanes: a ray that passed between two triangles of a closed surface would leak light from behind it."""
+    """Exact comparison of lanes: a ray that passed between two triangles of a closed surface would leak light
+    from behind it.
+    """
     return Strict(lanes.builder, lanes.value)
 
 

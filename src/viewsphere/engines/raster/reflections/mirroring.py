@@ -43,7 +43,9 @@ def lying(geometry: Geometry, height: float) -> NDArray[np.bool_]:
 
 
 def looked_at(camera: Camera, visibility: Visibility, at: NDArray[np.intp]) -> tuple[Float, Float]:
-    """Cosines (n,) of the angles between these pixels' rays and the vertical, and the world places (n, 3) where the rays end."""
+    """Cosines (n,) of the angles between these pixels' rays and the vertical, and the world places (n, 3) where
+    the rays end.
+    """
     rays, camera_from_pixel = lens_rays(camera), inverse_camera_matrix(camera.intrinsics)
     table = np.zeros((0, 3)) if rays is None else rays.reshape(-1, 3)
     table.setflags(write=False)  # same type as for a lens, for one compilation

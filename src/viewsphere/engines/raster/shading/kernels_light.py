@@ -480,7 +480,9 @@ def compose(count, b):
 
 @inner(fastmath=FAST)
 def lay(pixel, i, b):
-    """Composite a premultiplied, composed sample over the current value of a pixel (4,); coloured glass tints its background."""
+    """Composite a premultiplied, composed sample over the current value of a pixel (4,); coloured glass tints
+    its background.
+    """
     under, behind = f4(1) - b[ALPHA + i], pixel[3]
     pixel[0] = max(pixel[0] * (under + b[T0 + i]) + b[RED + i] - behind * b[T0 + i] * b[T3 + i], f4(0))
     pixel[1] = max(pixel[1] * (under + b[T1 + i]) + b[GREEN + i] - behind * b[T1 + i] * b[T4 + i], f4(0))

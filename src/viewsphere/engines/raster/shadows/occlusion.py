@@ -337,7 +337,9 @@ def _read_points(casters: Casters, corner: Float, cells: float, shape: NDArray[n
 
 
 def _mark(known: Float32, is_first: NDArray[np.bool_]) -> None:
-    """Mark the first of the eight points around each place at which surface points (6, N), place and normal, read the volume."""
+    """Mark the first of the eight points around each place at which surface points (6, N), place and normal,
+    read the volume.
+    """
     place, normal = known[:3], known[3:]
     off = normal * (_PUSH / np.maximum(np.sqrt((normal * normal).sum(axis=0)), 1e-6))
     layers, rows, columns = is_first.shape
@@ -349,7 +351,9 @@ def _mark(known: Float32, is_first: NDArray[np.bool_]) -> None:
 
 
 def _floor(casters: Casters, z: float, directions: Float32, views: Views, size: int) -> tuple[Float32, Float32]:
-    """The share of the sky's light that the targets leave to the surface below them, (size, size), and the place of this map."""
+    """The share of the sky's light that the targets leave to the surface below them, (size, size), and the
+    place of this map.
+    """
     low, high = casters.extent.low, casters.extent.high
     height = float(high[2]) - z
     half = float(max((high - low)[:2].max() / 2, 1e-3) + 0.9 * height)

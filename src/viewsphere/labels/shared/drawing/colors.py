@@ -21,7 +21,9 @@ GOLDEN = 0.618034
 
 
 def by_number(picture: NDArray[np.uint8], numbers: NDArray[np.int32]) -> NDArray[np.uint8]:
-    """The picture (H, W, 3) in grey, with a separate colour for every number above 0. Neighbouring numbers have distant hues."""
+    """The picture (H, W, 3) in grey, with a separate colour for every number above 0. Neighbouring numbers have
+    distant hues.
+    """
     grey = picture.mean(axis=2, keepdims=True).repeat(3, axis=2)
     hue = (numbers * GOLDEN)[..., None] % 1 + np.array([0, 2 / 3, 1 / 3])
     light = 0.35 + 0.65 * grey / 255
