@@ -12,7 +12,7 @@ REPEATED = """
 import sys
 import viewsphere as vs
 from viewsphere.run.executors import local
-local.Hand.__init__ = None  # no worker can start
+local._Worker.__init__ = None  # no worker can start
 summary = vs.generate(vs.Recipe.load(sys.argv[1]), sys.argv[2], workers=None)
 assert summary.rendered == 0
 print(sorted({"numba", "scipy", "trimesh"} & set(sys.modules)))
