@@ -31,8 +31,8 @@ Extents = dict[str, Extent]
 
 
 def played(films: Sequence[Film], frames: int) -> list[Film]:
-    """Sequences spread evenly over all, with evenly spaced instants, such that they have at most so many frames together; one
-    has two instants at least.
+    """Sequences spread evenly over the data set, with evenly spaced instants and at most this many frames in total. Each
+    sequence has at least two instants.
     """
     if not films:
         return []
