@@ -166,7 +166,7 @@ def values(out: Path) -> Iterator[dict[str, Any]]:
         }
         for o in sample.objects:
             for field in dataclasses.fields(o):
-                if field.name not in ("id", "source", "more"):
+                if field.name not in ("id", "source", "extra"):
                     said[f"object {o.id} {field.name}"] = plain(getattr(o, field.name))
         yield said
 
