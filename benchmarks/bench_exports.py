@@ -77,7 +77,7 @@ class Times:
 
 @contextmanager
 def clocks(times: Times) -> Generator[None]:
-    """While this lasts, an export tells what reading, making and linking take of it."""
+    """Measure the times of reading, making and linking in exports during this block."""
     read, link, preparer = Dataset.samples_of, Dataset.link, Target.preparer
 
     def timed_read(self: Dataset, *args: Any) -> Iterator[Any]:

@@ -41,7 +41,7 @@ from viewsphere.truth.shot_views import ShotViews
 PLAIN = ("depth", "instances", "normals")
 RASTER = "truth: raster"
 TOGETHER = ("amodal", "nocs", "keypoints", "panoptic")
-"""Labels whose cost together is told beside that of the plain channels."""
+"""Labels whose joint cost is printed beside the cost of the plain channels."""
 
 
 def recipe(objects: int) -> Recipe:

@@ -81,7 +81,7 @@ def simulate(load: Load, cluster: Cluster, seed: int = 0) -> SequenceState:
 
 
 IDLE, MADE, STORED, FAILED = range(4)
-"""The events: a worker asks for a shot, has made it, has it stored; a node fails."""
+"""The events: a worker requests a shot, has made it, has it stored; a node fails."""
 
 
 class _Run:

@@ -37,7 +37,7 @@ HOW = {"off": {"bounces": "off"}, "on": {"bounces": "on"}, "fine": {"bounces": "
 
 @dataclass(frozen=True)
 class Case:
-    """A place, seen from `eye` towards `target`, or from where the recipe says; part: of the samples asked for."""
+    """A place, seen from `eye` towards `target`, or from the recipe's viewpoint; part: the share of samples to compare."""
 
     name: str
     place: str

@@ -30,7 +30,7 @@ HEAD = """\
 |---|---|---:|---:|---:|---|---|
 """
 VARIES = r"[\d,]+ of [\d,]+ frames are kept|nothing was finished yet"
-"""Of what is said that which differs from time to time."""
+"""Parts of messages that differ between runs."""
 
 TIMES = {
     ("SIGKILL of everything", "render"): 50,
@@ -50,7 +50,7 @@ TIMES = {
 
 
 def campaign(share: float, seed: int) -> bool:
-    """Hit the works with the faults, write the table, and say whether all is as it should be."""
+    """Apply the faults, write the table, and return whether all results are as expected."""
     rows: list[str] = []
     is_good = True
     with tempfile.TemporaryDirectory(prefix="viewsphere-faults-") as place:

@@ -77,7 +77,7 @@ def campaign(target: str, first: int, stop: int) -> tuple[str, int, list[dict[st
 
 
 def main() -> None:
-    """Run what the arguments ask for."""
+    """Run the targets of the arguments."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("targets", nargs="*", metavar="TARGET", help=f"any of {', '.join(TARGETS)}; all by default")
     parser.add_argument("--inputs", type=int, default=1000, help="of each target")

@@ -119,7 +119,7 @@ class Mallinfo2(ctypes.Structure):
 
 
 def heap() -> float:
-    """MB that are in use of this process's heap; 0 where the C library does not say."""
+    """MB in use of this process's heap; 0 if the C library does not report it."""
     ask = getattr(ctypes.CDLL(None), "mallinfo2", None)
     if ask is None:
         return 0.0

@@ -1,4 +1,4 @@
-"""Print the test files that a change can break, one a line, or `tests` for all of them; say on standard error why.
+"""Print the test files that a change can break, one a line, or `tests` for all of them; print the reason on standard error.
 
     scripts/chosen_tests.py              this branch and the working tree, since the branch left origin/main
     scripts/chosen_tests.py REVISION     since that revision
@@ -324,7 +324,7 @@ def git(*words: str) -> list[str]:
 
 
 def changed_since(revision: str | None) -> list[str]:
-    """Files that changed, also those that git does not know yet; by default since this branch left `MAIN`."""
+    """Files that changed, including untracked ones; by default since this branch left `MAIN`."""
     if revision is None:
         (revision,) = git("merge-base", MAIN, "HEAD")
         if [revision] == git("rev-parse", "HEAD") and not git("status", "--porcelain"):

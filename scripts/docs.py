@@ -1,6 +1,6 @@
 """The documentation: pages and pictures that are made from the code, and the site made of all pages.
 
-scripts/docs                 # generate: write what is generated; with --check only say whether it is true
+scripts/docs                 # generate: write what is generated; with --check only report differences
 scripts/docs build           # the site, into site/; a warning is an error, and so is a link that leads nowhere
 scripts/docs serve           # the site at http://localhost:8000, built again whenever a page changes
 """

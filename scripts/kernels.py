@@ -110,7 +110,7 @@ def run(task: tuple[str, str]) -> dict[str, Any] | None:
 
 
 def needs(name: str, runs: Iterable[Mapping[str, Any]]) -> tuple[str, ...] | None:
-    """The features that tell the shots that call a kernel from the others: none, one, or all that its callers share."""
+    """The features that separate the shots that call a kernel from the others: none, one, or all that its callers share."""
     shots = [(frozenset(each["features"]), name in each["used"]) for each in runs if each["features"] is not None]
     calling = [features for features, calls in shots if calls]
     if not calling:

@@ -39,7 +39,7 @@ def recipes() -> dict[str, Recipe]:
 
 
 def recipe_of(source: str) -> str:
-    """The name of the recipe that shows a label or pass: that of its own name, else one that asks for it."""
+    """The name of the recipe that shows a label or pass: the recipe of that name, else one that requests it."""
     asking = (name for name, recipe in recipes().items() if source in (*recipe.channels, *recipe.annotations))
     return source if source in recipes() else next(asking, EVERYWHERE)
 

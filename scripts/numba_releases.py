@@ -29,7 +29,7 @@ ROOT = Path(__file__).resolve().parents[1]
 TESTS = ROOT / "tests"
 DIGESTS = TESTS / "truth" / "truth_digest.py"
 OF_THE_QUICKER = "tests/kernels/test_fence.py", "tests/kernels/test_compiler.py"
-"""Tests of the quicker compiler and of when it is loaded, which say nothing of an older numba without it."""
+"""Tests of the quicker compiler and of when it is loaded, which do not apply to an older numba without it."""
 
 
 def installed(release: str) -> Path | None:

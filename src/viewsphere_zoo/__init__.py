@@ -94,7 +94,7 @@ def build(name: str, rng: np.random.Generator) -> Mesh:
 
 
 def _random(name: str, rng: np.random.Generator) -> Any:
-    """What the family's `random` makes: a Mesh, or a RiggedModel for a family that moves; raises PluginError for another."""
+    """The result of the family's `random`: a Mesh, or a RiggedModel for a family that moves; raises PluginError for another."""
     from viewsphere.assets.mesh import Mesh
     from viewsphere.plugins.family import ZooFamily
 
@@ -107,8 +107,8 @@ def _random(name: str, rng: np.random.Generator) -> Any:
 
 
 def build_zoo_model(spec: ModelSpec) -> Mesh | Path:
-    """The procedural model that a `zoo:family` source names, drawn from its seed, and built to the size that it asks for: its
-    mesh, from the cache where it is there, or the file of one that moves.
+    """The procedural model that a `zoo:family` source names, drawn from its seed and built to its requested size: its mesh,
+    from the cache if possible, or the file of a moving model.
     """
     file = file_of(spec)
     if file is not None:

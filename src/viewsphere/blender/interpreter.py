@@ -117,7 +117,7 @@ def find_blender(python: str | None = None) -> Path:
 
 
 def probe(python: Path) -> Blender:
-    """Start this interpreter's Blender, ask for its version and devices, and try to draw; takes two minutes at most."""
+    """Start this interpreter's Blender, read its version and devices, and try to draw; takes two minutes at most."""
     with temporary("probe") as folder:
         try:
             with BlenderProcess(python, folder / "log") as process:

@@ -242,7 +242,7 @@ def _proof(dataset: Dataset, frames: int) -> Proof:
 
 
 def _frames_asked(text: str | None) -> int | None:
-    """The number of frames that `--repaint` asks for, None for all."""
+    """The number of frames that `--repaint` requests, None for all."""
     if text == "all":
         return None
     if text is None or text.isdecimal():

@@ -1,4 +1,4 @@
-"""The command `doctor`: tells what works on this machine."""
+"""The command `doctor`, which reports the features that work on this machine."""
 
 from __future__ import annotations
 

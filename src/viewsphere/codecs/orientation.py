@@ -1,4 +1,4 @@
-"""EXIF's orientation, which tells a viewer how to rotate a picture.
+"""EXIF's orientation, the rotation for the display of a picture.
 
 https://www.cipa.jp/std/documents/e/DC-008-2012_E.pdf, section 4.6.4 A.
 """

@@ -66,8 +66,8 @@ UNIT = 1e-5
 
 
 def compute(context: LabelContext) -> NDArray[np.void]:
-    """As many rows an object as the option `count` says, in the order of the ids, (N,) of `SURFACE_SAMPLE`; none of an object
-    that is not there, or has no surface.
+    """Rows of samples, `count` (an option) for each object, in the order of the ids, (N,) of `SURFACE_SAMPLE`; none of an
+    object that is not there, or has no surface.
 
     The points are drawn evenly by area on the model at that instant. All instances have the same points, wherever they are.
     Visibility is that of `tracks`: the segment from the camera's centre to the point meets no other surface.

@@ -136,7 +136,7 @@ def _shown(folder: Path, where: str) -> list[Path]:
 
 
 def _check_file(entry: ModelEntry, found: _Found) -> None:
-    """See, by its name alone, that a file can be read as the entry says.
+    """Check, by its name alone, that a file can be read with the entry's settings.
 
     Raises RecipeError for a kind of file that is not read and a forward along the file's up axis, MissingExtraError where
     Blender reads such files and is not installed.
@@ -179,7 +179,7 @@ def categories(recipe: Recipe) -> tuple[Category, ...]:
 
 
 def _expanded(recipe: Recipe, index: int) -> tuple[tuple[Named, tuple[str, ...]], ...]:
-    """The names of an entry that sources know, each with the single models that it stands for; none for an entry of files.
+    """The names of an entry that sources expand, each with its single models; none for an entry of files.
     Raises RecipeError for an unknown name.
     """
     expanded: list[tuple[Named, tuple[str, ...]]] = []

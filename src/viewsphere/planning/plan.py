@@ -77,7 +77,7 @@ COUNTED = 200_000
 """Largest number of frames, or scenes, whose splits are counted one by one."""
 
 SHOT_FRAMES = 16
-"""Most frames of a shot, unless the recipe or the caller says otherwise."""
+"""Most frames of a shot, unless the recipe or the caller sets another number."""
 
 
 @dataclass(frozen=True, eq=False)

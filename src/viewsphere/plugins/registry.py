@@ -164,7 +164,7 @@ def shipped(kind: Kind) -> Mapping[str, str]:
 
 
 def gap() -> str:
-    """What the installation lacks, and the remedy, in words for messages; empty where it is whole.
+    """The missing part of the installation and the remedy, in words for messages; empty if nothing is missing.
 
     Plug-ins of some kinds are found by entry points, which are written when viewsphere is installed. A clone that was updated
     since may lack them.
@@ -198,7 +198,7 @@ def _folders(package: str) -> Changes:
 @lru_cache(maxsize=4 * len(SEAMS))
 def _table(installed: Changes, kind: Kind, packages: tuple[tuple[_Found, Changes], ...]) -> Mapping[str, _Found]:
     """The plug-ins by name. One that an entry point names comes before one of its name in a package. A package that cannot be
-    imported stands for itself: loading it says why.
+    imported is listed itself; loading it raises the reason.
     """
     found: dict[str, _Found] = {}
     for package, folders in packages:
@@ -296,8 +296,8 @@ def attribute(path: str) -> Any:
 
 
 def _plugins_in(paths: Changes, package: _Found, seam: Seam) -> dict[str, _Found]:
-    """The modules in a package's folders by the names of the plug-ins that they hold. A third party's module whose names cannot
-    be read stands for itself: loading it says why.
+    """The modules in a package's folders by the names of the plug-ins that they hold. A third party's module with unreadable
+    names is listed itself; loading it raises the reason.
     """
     homes: dict[str, _Found] = {}
     for module in pkgutil.iter_modules([path for path, _ in paths]):

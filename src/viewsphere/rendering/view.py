@@ -70,7 +70,7 @@ def develop(radiance: Float32, background: Float32 | None, view: ViewTransform, 
 
 
 def to_display_linear(radiance: Float32, background: Float32 | None, view: ViewTransform, alpha: bool = False) -> Float32:
-    """As `develop`, before the sRGB curve: (H, W, 3) float32 in [0, 1]; with `alpha` (H, W, 4), premultiplied."""
+    """The result of `develop` before the sRGB curve: (H, W, 3) float32 in [0, 1]; with `alpha` (H, W, 4), premultiplied."""
     from viewsphere.rendering import kernels_view as kernels
 
     out = np.empty((*radiance.shape[:2], 4 if alpha else 3), np.float32)

@@ -82,7 +82,7 @@ def facts(dataset: Dataset, times: list[tuple[float, int]]) -> dict[str, Any]:
 
 
 def _recipe(part: Part) -> str:
-    """The recipe of a part as YAML, after a line that says which frames the part added."""
+    """The recipe of a part as YAML, after a line with the frames that the part added."""
     import yaml
 
     frames = f"{part.frames:,} frames from {part.first:,}" if part.frames else "no frames of its own"

@@ -1,1 +1,1 @@
-"""What is wrong with given values, in the words of users: messages, suggestions, mistakes in the specs of plug-ins."""
+"""Messages about invalid values: suggestions, and mistakes in recipes and in the specs of plug-ins."""

@@ -1,4 +1,4 @@
-"""As its layout dropped it."""
+"""The motion of a model that its layout dropped."""
 
 from __future__ import annotations
 

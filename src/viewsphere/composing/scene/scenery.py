@@ -52,9 +52,8 @@ class Naming(Protocol):
 
 @dataclass(frozen=True)
 class SceneryPiece:
-    """A model and where it stands; `labels` says whether it is an object of its own.
-
-    name: unique in its place; motion: how it moves under time, as the recipe's `field` says.
+    """A model and its pose; `labels` is true for an object of its own. name: unique in its place; motion: its motion under
+    time, from the recipe's `field`.
     """
 
     model: ModelSpec
@@ -75,7 +74,7 @@ def draw_names(draw: str, model: str, pose: str | None) -> Names:
 
 
 def place_pieces(recipe: Recipe, entry: PlaceEntry, names: Names, category_id: Naming) -> tuple[SceneryPiece, ...]:
-    """The place's pieces, turned as the entry says; of a file there is one.
+    """The place's pieces, rotated by the entry's angle; a file is one piece.
 
     Raises RecipeError for an unknown place, for a file that is not there, and for motions of pieces that it does not have.
     """
@@ -208,7 +207,7 @@ def _drawn_place(seed: int, source: str, names: Names, traffic: Traffic | None) 
 
 
 def free_floor(recipe: Recipe, entry: PlaceEntry | None, names: Names) -> Footprint | None:
-    """The floor that a place leaves to its targets, None if it does not say. Raises RecipeError for a file whose `origin` is
+    """The floor that a place leaves to its targets, None if it is unknown. Raises RecipeError for a file whose `origin` is
     not on its floor.
     """
     if entry is None:
@@ -275,7 +274,7 @@ def _file_spec(recipe: Recipe, entry: PlaceEntry) -> ModelSpec:
 
 
 def scenery_key(name: str, rest: str) -> str:
-    """A key that says what it is of and differs for other scenery."""
+    """A readable key that differs for other scenery."""
     safe = "".join(c if c.isalnum() or c in "-_" else "_" for c in name)[:60]
     return f"{SCENERY}{safe}-{hashlib.sha256(f'{name}/{rest}'.encode()).hexdigest()[:10]}"
 

@@ -392,7 +392,7 @@ class ListedPoses(Poses):
 
     @property
     def lowest_elevation(self) -> float:
-        """The lowest elevation of orbits; for motions, elevation does not tell whether they are below the ground."""
+        """The lowest elevation of orbits; for motions, elevation does not show whether they are below the ground."""
         return min((view.elevation for view, target in self._views if target is None), default=90.0)
 
     def name(self, index: int) -> str:

@@ -36,7 +36,7 @@ def writer(
 ) -> Generator[Callable[[Sample], None]]:
     """Write the files of all splits and the card.
 
-    Raises UserError for splits that `datasets` could not tell apart.
+    Raises UserError for splits that `datasets` could not distinguish.
     """
     if len({split_name(split) for split in dataset.splits}) < len(dataset.splits):
         told = ", ".join(dataset.splits)

@@ -31,7 +31,7 @@ class Need(ABC, Generic[T]):
     """The part of an error message that describes the section."""
 
     IS_RECORDED: ClassVar[bool] = False
-    """Whether a data set provides the input only if its recipe requested the label."""
+    """True if a data set provides the input only if its recipe requested the label."""
 
     @abstractmethod
     def read(self, neighbours: NeighbourViews) -> T:
@@ -65,7 +65,7 @@ class Next(_OfTime["View | None"]):
 
     @property
     def view_offset(self) -> int:
-        """As many instants as the need names."""
+        """The number of instants between the two."""
         return self.instants
 
     def read(self, neighbours: NeighbourViews) -> View | None:
@@ -97,7 +97,7 @@ class Poses(_OfTime["Moment | None"]):
 
     @property
     def pose_offset(self) -> int:
-        """As many instants as the need names."""
+        """The number of instants between the two."""
         return self.instants
 
     def read(self, neighbours: NeighbourViews) -> Moment | None:

@@ -47,7 +47,7 @@ def check_redraws(recipe: Recipe) -> None:
 
 
 def check_distractors(recipe: Recipe) -> None:
-    """Check that the recipe has labelled models, and that it has distractors exactly if it asks for them."""
+    """Check that the recipe has labelled models, and that it has distractors exactly if it requests them."""
     unlabelled = [i for i, entry in enumerate(recipe.models) if not entry.is_labelled]
     asked = span(recipe.scenes.distractors)[1] if isinstance(recipe.scenes, ScenesEntry) else 0
     if len(unlabelled) == len(recipe.models):

@@ -142,7 +142,7 @@ Shared = Annotated[
         description="true: one draw for all models or random scenes; by default each has its own",
     ),
 ]
-"""Whether random viewpoints are drawn once for all subjects."""
+"""True to draw random viewpoints once for all subjects."""
 
 
 class Jitter(_Axes):

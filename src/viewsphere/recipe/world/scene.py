@@ -330,7 +330,7 @@ class SceneEntry(Frozen):
     def over_time(self) -> SceneEntry:
         """The entry for sequences: values drawn per frame by default are drawn once a sequence.
 
-        Raises ValueError if the recipe asks for a scene per frame.
+        Raises ValueError if the recipe requests a scene per frame.
         """
         parts: dict[str, Frozen] = {name: once_a_sequence(part) for name, part in self if isinstance(part, PerFrame)}
         if self.blend is not None:

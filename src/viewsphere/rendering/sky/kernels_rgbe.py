@@ -57,7 +57,9 @@ def _new_row(data, at, row):
 
 @inner
 def _old_row(data, at, row):
-    """As `_new_row`, in the old encoding: (1, 1, 1, n) repeats the texel before n times, the next one n times 256, ..."""
+    """The equivalent of `_new_row` for the old encoding: (1, 1, 1, n) repeats the texel before n times, the next one n times
+    256, ...
+    """
     j, shift = 0, 0
     while j < row.shape[0]:
         if at + 4 > data.shape[0]:

@@ -85,12 +85,12 @@ class RayPool:
 
     @property
     def under_way(self) -> int:
-        """As of `WorkerPool`."""
+        """See `WorkerPool`."""
         return sum(self._begun.values())
 
     @property
     def nodes(self) -> int:
-        """As of `WorkerPool`."""
+        """See `WorkerPool`."""
         return len({worker.node for worker in self._pool if worker.is_ready})
 
     @property

@@ -108,7 +108,7 @@ class Target:
 
     @contextmanager
     def _named(self) -> Generator[None]:
-        """Add the data set and the format to the user's errors, whose origin may not know them; errors of stored files do not
+        """Add the data set and the format to the user's errors, whose origin may lack them; errors of stored files do not
         change.
         """
         try:

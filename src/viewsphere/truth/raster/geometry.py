@@ -455,7 +455,7 @@ def _offset_triangles(parts: Sequence[NDArray[np.int32]], firsts: Sequence[int])
 
 
 def _are_used(meshes: Sequence[Mesh]) -> NDArray[np.bool_]:
-    """Whether each vertex of these meshes is a corner of a triangle, (V,); a repeated mesh is processed once."""
+    """A mask (V,) of the vertices of these meshes that are corners of a triangle; a repeated mesh is processed once."""
     known: dict[int, NDArray[np.bool_]] = {}
     for mesh in meshes:
         if id(mesh) not in known:

@@ -1,6 +1,6 @@
 """FBX, USD, Alembic and .blend files: Blender opens and evaluates them, in its own process.
 
-Blender reads only the model's folder unless the model says `confined: false`, writes nowhere, runs no scripts and reaches no
+Blender reads only the model's folder unless the model has `confined: false`, writes nowhere, runs no scripts and reaches no
 network. Textures are read here, like any other model's.
 """
 

@@ -103,7 +103,7 @@ def _columns(
 
 
 def _text_columns(folder: ModelFolder, text: bytes, elements: Sequence[Element], before: int) -> tuple[dict[str, Columns], int]:
-    """As `_columns`, for a text, whose numbers are first converted to a binary file of doubles."""
+    """The equivalent of `_columns` for a text, whose numbers are first converted to a binary file of doubles."""
     doubles = [replace(e, properties=tuple(_as_double(p) for p in e.properties)) for e in elements]
     return _columns(folder, numbers_in(folder, text, before).tobytes(), doubles, "<", 0)
 

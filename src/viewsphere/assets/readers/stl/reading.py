@@ -21,7 +21,7 @@ LOOKED_AT = 1024
 """Number of leading bytes without a NUL in a text file: a binary file has NULs in its count and its first numbers."""
 
 OWN_COLOR = 0x8000
-"""Bit of a facet's attribute. In files of Materialise Magics, whose header says COLOR=, it means that the facet has no colour
+"""Bit of a facet's attribute. In files of Materialise Magics, with COLOR= in the header, it means that the facet has no colour
 of its own.
 """
 

@@ -162,7 +162,7 @@ def _collections(one):
 
 
 def _shines(owner):
-    """Return whether a world or a material gives light, as far as can be told without rendering."""
+    """Return whether a world or a material gives light, as far as this is visible without rendering."""
     if owner is None or (isinstance(owner, bpy.types.Material) and not owner.users):
         return False
     tree = owner.node_tree if getattr(owner, "use_nodes", True) else None

@@ -51,7 +51,7 @@ def open_file(file, kind, root, cameras=False, clip=None, fps=None):
 
 def _import(file, kind, cameras, fps):
     """Import a file into an empty scene of `fps` frames a second, None for the file's own, which Blender's reader of FBX sets
-    by itself. A glTF file says in seconds when its keys are: it is imported again where these are no frames of the first
+    by itself. A glTF file has the times of its keys in seconds: it is imported again where these are no frames of the first
     import.
     """
     rate = fps or own_rate(file, kind) or DEFAULT
@@ -63,7 +63,7 @@ def _import(file, kind, cameras, fps):
 
 
 def _import_at(file, kind, cameras, rate):
-    """Import a file into an empty scene of so many frames a second; an FBX file says itself how many these are."""
+    """Import a file into an empty scene of this frame rate; an FBX file brings its own."""
     bpy.ops.wm.read_factory_settings(use_empty=True)
     render = bpy.context.scene.render
     set_rate(bpy.context.scene, rate)

@@ -126,7 +126,9 @@ def prepare(scene):
 
 
 class Marks:
-    """Collects the objects that have the property, or are lanes by their names: `found` tells them, in the order of names."""
+    """A collector of the objects that have the property, or are lanes by their names: `found` lists them, in the order of
+    names.
+    """
 
     def __init__(self, wanted):
         self.found, self._wanted = [], wanted
@@ -182,7 +184,7 @@ class Points:
         self.found, self._wanted = [], wanted
 
     def take(self, depsgraph):
-        """Collect all points of a depsgraph: objects that are asked for, in the order of their names, else bones."""
+        """Collect all points of a depsgraph: requested objects, in the order of their names, else bones."""
         there = sorted(depsgraph.objects, key=lambda one: one.name)
         said = {one.name: name for one in there if self._is_wanted(one) and (name := _said(one))}
         self._tell([(one, said[one.name], one.matrix_world.translation) for one in there if one.name in said])

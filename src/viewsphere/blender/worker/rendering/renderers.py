@@ -68,7 +68,7 @@ def _choose(render, name):
 
 
 def _set_up_cycles(scene, settings):
-    """Cycles' settings; adaptive sampling is off unless asked for."""
+    """Cycles' settings; adaptive sampling is off unless requested."""
     cycles = scene.cycles
     cycles.samples = settings["samples"]
     cycles.use_adaptive_sampling = False

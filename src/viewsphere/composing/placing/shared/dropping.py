@@ -51,7 +51,7 @@ waiting for something that trembles on.
 """
 
 ROUNDS = 2
-"""How often things that missed are dropped again, per thing of the cast."""
+"""Number of times that things which missed are dropped again, per thing of the cast."""
 
 SPOTS = 12
 """Number of tried spots for each dropped thing; the lowest is used."""

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 Float = NDArray[np.float64]
 
 CELLS = 1024
-"""Cells along the longer side of a grid: 1 cm for 10 m, as fine as gaps that recipes ask for."""
+"""Cells along the longer side of a grid: 1 cm for 10 m, as fine as the gaps in recipes."""
 
 FINE = 0.08
 """Largest cell, metres: grids of more than 40 m have more cells instead, so that gaps between parked cars remain visible."""

@@ -220,7 +220,7 @@ def place(texels, levels, mode, count, c, q, places):
 
 @lanewise
 def _neighbours(wrap, is_nearest, coordinate, length, first, q, places):
-    """The two texels beside each coordinate, wrapped as `wrap` says; the second texel's weight replaces the coordinate."""
+    """The two texels beside each coordinate, wrapped by the mode `wrap`; the second texel's weight replaces the coordinate."""
     repeats, mirrors, clamps = wrap.equals(REPEAT), wrap.equals(MIRROR), wrap.equals(CLAMP)
     x = q[coordinate]
     # Mirrored, a texture repeats after twice its length.

@@ -260,7 +260,7 @@ def _hide(count, occlusion, k, is_ground, b):
 
 @inner
 def occlude(count, occlusion, b):
-    """Fill OPEN and BOUNCE of a block of samples, either all on the ground or none (row GROUND of the first sample tells).
+    """Fill OPEN and BOUNCE of a block of samples, either all on the ground or none (see row GROUND of the first sample).
 
     With a ground, OPEN is the share of the cosine-weighted upper sky, and BOUNCE that of the ground's light. Without one, both
     are the share of the whole hemisphere above the surface. Both include the occlusion texture (row AO).
