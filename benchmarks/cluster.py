@@ -58,7 +58,7 @@ class Cluster:
 
 
 @dataclass(frozen=True)
-class SequenceState:
+class Outcome:
     """The outcome of a run: its makespan in seconds; shots finished and lost (made again); the seconds for which workers made
     shots that were finished; the core seconds there were.
     """
@@ -75,9 +75,9 @@ class SequenceState:
         return self.useful / self.available
 
 
-def simulate(load: Load, cluster: Cluster, seed: int = 0) -> SequenceState:
+def simulate(load: Load, cluster: Cluster, seed: int = 0) -> Outcome:
     """One run of a load on a cluster; the same for the same seed."""
-    return _Run(load, cluster, np.random.default_rng(seed)).course()
+    return _Run(load, cluster, np.random.default_rng(seed)).outcome()
 
 
 IDLE, MADE, STORED, FAILED = range(4)
@@ -101,7 +101,7 @@ class _Run:
         self.now = self.handing = self.store = 0.0
         self.number = 0
 
-    def course(self) -> SequenceState:
+    def outcome(self) -> Outcome:
         """Let everything happen until all shots are stored."""
         cluster = self.cluster
         for node in range(cluster.nodes):
@@ -115,7 +115,7 @@ class _Run:
                 self._fail(who)
             elif life == self.lives[who // cluster.cores]:
                 (self._hand_out, self._store, self._finish)[what](who)
-        return SequenceState(self.now, self.finished, self.lost, self.useful, self.now * cluster.nodes * cluster.cores)
+        return Outcome(self.now, self.finished, self.lost, self.useful, self.now * cluster.nodes * cluster.cores)
 
     def _drawn(self, seconds: np.ndarray) -> Iterator[float]:
         while True:

@@ -29,9 +29,6 @@ HEAD = """\
 | fault | during | times | finished shots lost | files torn | equal bytes after | what it said |
 |---|---|---:|---:|---:|---|---|
 """
-VARIES = r"[\d,]+ of [\d,]+ frames are kept|nothing was finished yet"
-"""Parts of messages that differ between runs."""
-
 TIMES = {
     ("SIGKILL of everything", "render"): 50,
     ("SIGKILL of everything", "append"): 10,

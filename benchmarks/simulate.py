@@ -25,7 +25,7 @@ from multiprocessing import get_context
 from pathlib import Path
 
 from bench_scene import reference_recipe, write_reference
-from cluster import Cluster, Load, SequenceState, simulate
+from cluster import Cluster, Load, Outcome, simulate
 
 from viewsphere import Recipe, generate
 from viewsphere.run.progress import Progress
@@ -220,9 +220,9 @@ def courses(measured: Measured) -> str:
     return f"\n{SIMULATED:,} images, makespan and efficiency:\n\n{rows(table)}"
 
 
-def told(course: SequenceState) -> str:
+def told(outcome: Outcome) -> str:
     """Makespan and efficiency."""
-    return f"{duration(course.makespan)}, {course.efficiency:.0%}"
+    return f"{duration(outcome.makespan)}, {outcome.efficiency:.0%}"
 
 
 def page(measured: Measured) -> str:

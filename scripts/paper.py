@@ -156,7 +156,7 @@ def hairdryer() -> None:
 
 
 def fig1() -> None:
-    """The paper's figure: on the left model and picture, in the middle 3D box and sizes, on the right depth, 2D box and mask."""
+    """The paper's figure: left, model and picture; middle, 3D box and sizes; right, depth, 2D box and mask."""
     pick = Pick(4, 35, 20, 5)
     (sample,) = frames(recipe("car"), [pick])
     channels = ["rgb", "triangles", "normals_geometric"]

@@ -22,14 +22,14 @@ MOST_GROUPS = 32
 """Number of entry-point groups, and of packages, whose contents are cached: more than there are kinds of plug-ins."""
 
 
-def listed(package: str) -> tuple[tuple[str, bool], ...]:
-    """Names of a package's modules, and whether each is a package itself. The list is renewed after the folder changes."""
+def listed(package: str) -> tuple[str, ...]:
+    """Names of a package's modules. The list is renewed after the folder changes."""
     return _modules_in(changes(importlib.import_module(package).__path__))
 
 
 @lru_cache(maxsize=MOST_GROUPS)
-def _modules_in(paths: Changes) -> tuple[tuple[str, bool], ...]:
-    return tuple((m.name, m.ispkg) for m in pkgutil.iter_modules([path for path, _ in paths]))
+def _modules_in(paths: Changes) -> tuple[str, ...]:
+    return tuple(m.name for m in pkgutil.iter_modules([path for path, _ in paths]))
 
 
 def entry_points(group: str) -> metadata.EntryPoints:

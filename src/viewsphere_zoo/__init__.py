@@ -55,16 +55,11 @@ def drawing_of(name: str) -> Callable[[np.random.Generator], Any]:
     return draw
 
 
-def home(name: str) -> str:
-    """Return the home of a family; raises UserError as `family` does."""
-    return family(name).home
-
-
 def things() -> tuple[str, ...]:
     """Names of the shipped families that are things, not parts of places, sorted; all of them are imported. Families of other
     packages are left out: installing one does not change what a recipe draws.
     """
-    return tuple(sorted(name for name in plugins.shipped("families") if home(name) != "place"))
+    return tuple(sorted(name for name in plugins.shipped("families") if family(name).home != "place"))
 
 
 def family_names() -> tuple[str, ...]:
@@ -154,13 +149,13 @@ def file_of(spec: ModelSpec) -> Path | None:
     name = spec.source.removeprefix(ZOO)
     if not spec.source.startswith(ZOO) or not family(name).clips:
         return None
-    is_own, spare = plugins.is_third_party("families", name), _spare_files(os.getpid())
+    is_third_party, spare = plugins.is_third_party("families", name), _spare_files(os.getpid())
     file = cache_of("zoo") / f"{name}-{_digest(name)}-{spec.seed}.glb"
-    if not is_own and os.access(file, os.R_OK):  # `is_file` fails in a folder that cannot be read
+    if not is_third_party and os.access(file, os.R_OK):  # `is_file` fails in a folder that cannot be read
         note_use(file)
     elif file not in spare:
         data = _glb(name, spec.seed)
-        if is_own or not _into_cache(file, data):
+        if is_third_party or not _into_cache(file, data):
             own = _own_folder(os.getpid()) / file.name
             own.write_bytes(data)
             spare[file] = own

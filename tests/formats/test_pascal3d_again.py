@@ -128,7 +128,7 @@ def test_categories_that_become_one_word_stay_apart(tmp_path, names, files):
 def test_what_a_recipe_refuses_names_the_folder_that_is_asked_for(mine, tmp_path, monkeypatch):
     """Two models of one key, as of a format that does not tell its words apart."""
     twice = {str(i): SourceModel(Drafted(f"car/0{i}.off", b"OFF"), kind, name="car") for i, kind in enumerate(("a", "b"))}
-    shown = pascal3d.again(mine)
+    shown = pascal3d.source_cameras(mine)
     shows = replace(shown, models={**shown.models, **twice})
     monkeypatch.setattr(pascal3d, "FORMAT", pascal3d.FORMAT.model_copy(update={"again": lambda _: shows}))
     with pytest.raises(RecipeError, match="expected every model once") as error:

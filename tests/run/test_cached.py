@@ -6,7 +6,6 @@ from scratch import scratch_cache
 from small import small_recipe, tree_hash
 from viewsphere.caches import budget
 from viewsphere.engines.raster.indirect import bounces
-from viewsphere.kernels.entries import kernel_folder
 from viewsphere.run.generate import generate
 
 SKY = {"daylight": {"turbidity": 2.5}}
@@ -40,7 +39,6 @@ def rendered(tmp_path, monkeypatch):
 
 @pytest.mark.slow
 def test_the_cache_changes_no_byte(rendered, tmp_path, monkeypatch):
-    monkeypatch.setenv("NUMBA_CACHE_DIR", str(kernel_folder()))
     scratch_cache(monkeypatch, tmp_path / "cache")
     cold, times = rendered("cold")
     assert times >= 1  # one more where kernels are compiled first, for which a tiny scene is baked

@@ -46,11 +46,11 @@ def doctor(
     """Report features that work on this machine: processor, kernels, optional packages, Blender. Missing ones are no error."""
     if setup_blender:
         _set_up_blender()
+    downloads = _downloads() if setup else {}
     for name in setup or ():
-        from viewsphere.validation.errors import one_of
-
-        downloads = _downloads()
         if name not in downloads:
+            from viewsphere.validation.errors import one_of
+
             raise UserError(f"--setup: {one_of(name, tuple(downloads))}{'; ' if gap() else ''}{gap()}")
         downloads[name].fetch(lambda line: say(line, err=True))
     facts = examine()

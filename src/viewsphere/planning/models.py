@@ -302,8 +302,11 @@ def left_out(recipe: Recipe) -> Iterator[str]:
 def _matching(folder: Path, source: str, where: str) -> list[Path]:
     path = _path(folder, source)
     candidates = _candidates(folder, source, where)
-    wanted = _wanted(path)
-    matches = candidates if candidates == [path] else [f for f in candidates if f.suffix.lower() in wanted and f.is_file()]
+    if candidates == [path]:
+        matches = candidates
+    else:
+        wanted = _wanted(path)
+        matches = [f for f in candidates if f.suffix.lower() in wanted and f.is_file()]
     if not matches:
         endings, unread = ", ".join(sorted(_read_here())), _unread(folder, source, where)
         hint = f"; {_naming(folder, unread)}" if unread else ""
@@ -319,12 +322,13 @@ def _normal(path: Path) -> Path:
 def _unread(folder: Path, source: str, where: str) -> set[Path]:
     """Files that only Blender reads, which a folder or a pattern means but leaves out."""
     path = _path(folder, source)
-    others = {f".{suffix}" for suffix in suffixes(by_blender=True)} - _wanted(path)
     if has_magic(source) and path.suffix.lower() in _read_here():
         return set()  # every file that such a pattern means ends as it does
     candidates = _candidates(folder, source, where)
-    unread = () if candidates == [path] else (f for f in candidates if f.suffix.lower() in others and f.is_file())
-    return {_normal(f) for f in unread}
+    if candidates == [path]:
+        return set()
+    others = {f".{suffix}" for suffix in suffixes(by_blender=True)} - _wanted(path)
+    return {_normal(f) for f in candidates if f.suffix.lower() in others and f.is_file()}
 
 
 def _naming(folder: Path, unread: Collection[Path]) -> str:

@@ -245,9 +245,9 @@ class Plan(Shown, SamplingContext):
     @cached_property
     def _under(self) -> Mapping[str, Self]:
         """The plan under each variation; all share computed values, except light and finish."""
-        return {name: self.with_variation(recipe, name) for name, recipe in self.recipe.conditions.items()}
+        return {name: self._with_variation(recipe, name) for name, recipe in self.recipe.conditions.items()}
 
-    def with_variation(self, recipe: Recipe, variation: str) -> Self:
+    def _with_variation(self, recipe: Recipe, variation: str) -> Self:
         """Return the plan of one variation; the two share all values that do not depend on the scene."""
         varied = replace(self, recipe=recipe, original=self, variation=variation)
         known = {field.name for field in fields(self)} | {"scenes", "taken", "blocks", "rows", "_under"}
@@ -352,7 +352,7 @@ class Plan(Shown, SamplingContext):
         context = context.with_redraws(dict(zip(poses, redraws, strict=True))) if any(redraws) else context
         with self.recipe.located():
             made = self.sampler.shot(context, subject, poses, box_of, key, first)
-            shot = off_center(context, subject, filled(made, self.recipe.scenes is not None))
+            shot = _off_center(context, subject, filled(made, self.recipe.scenes is not None))
             if variation:
                 named = {"variation": variation, "sequence": shot.sequence and under(shot.sequence, variation)}
                 shot = shot.model_copy(update=named)
@@ -533,7 +533,7 @@ def _absent(thing: Thing, empty: Sequence[bool]) -> Thing:
     return thing.model_copy(update={"motion": motion})
 
 
-def off_center(context: SamplingContext, subject: str, shot: Shot) -> Shot:
+def _off_center(context: SamplingContext, subject: str, shot: Shot) -> Shot:
     """The shot with its cameras moved in their picture planes by the recipe's jitter. Their targets keep the distance along the
     camera's axis, and so their size. Cameras without their own viewpoint do not move.
     """

@@ -75,8 +75,8 @@ class FormatSpec(SpecWithOptions):
         description="`read(path, *, keep_going)`: a data set of this format as a `viewsphere.store.foreign.ForeignDataset`, "
         "for `viewsphere import`",
     )
-    again: Callable[[Any], Any] | None = Field(
+    as_recipe: Callable[[Any], Any] | None = Field(
         default=None,
-        description="`again(path)`: the cameras and models of a data set as `viewsphere.store.source_cameras.SourceCameras`, "
-        "for `viewsphere new --from`",
+        description="`as_recipe(path)`: the cameras and models of a data set, a "
+        "`viewsphere.store.source_cameras.SourceCameras`, for `viewsphere new --from`",
     )

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Self
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
+from viewsphere.errors import PluginError
 from viewsphere.model.model_spec import Axis
 from viewsphere.plugins.registry import Kind
 from viewsphere.plugins.spec import Spec
@@ -45,7 +46,7 @@ class ReaderSpec(Spec):
     timeline: Callable[[Any], Mapping[str, Any]] | None = Field(
         default=None,
         description="`timeline(folder)`: plain data with the `first` and `last` frame of the animation, `fps`, whether it "
-        "`moves`, and `clips`, each with `name`, `first` and `last`. A reader with `frames` needs it",
+        "`moves`, and `clips`, each with `name`, `first` and `last`. A reader with `frames` needs it, except with `by_blender`",
     )
     by_blender: bool = Field(default=False, description="whether Blender reads the files: patterns must then end in the suffix")
     is_picture: bool = Field(default=False, description="whether files are pictures, which folders and patterns leave out")
@@ -64,3 +65,12 @@ class ReaderSpec(Spec):
     archives: Mapping[str, str] = Field(
         default={}, description="suffixes of files that are archives, and their kind: `ZIP` or `gzip`"
     )
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        if self.frames is not None and self.timeline is None and not self.by_blender:
+            raise PluginError("ReaderSpec.timeline: expected a function, which `frames` needs; found none")
+        wrong = next((one for one in self.suffixes if one != one.lower() or one.startswith(".")), None)
+        if wrong is not None:
+            raise PluginError(f"ReaderSpec.suffixes: expected lower case without dots; found {wrong!r}")
+        return self

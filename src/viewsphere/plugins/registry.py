@@ -95,7 +95,7 @@ def names(kind: Kind) -> tuple[str, ...]:
 def prefix_of(source: str) -> str:
     """The prefix of a model's or place's source that a plug-in provides, such as `zoo` of `zoo:car`; empty for a file."""
     prefix, colon, _ = source.partition(":")
-    return prefix if colon and prefix in names("sources") else ""
+    return prefix if colon and prefix in _found("sources") else ""
 
 
 def load(spec: type[S], name: str) -> S:

@@ -146,8 +146,6 @@ COLOR_FORMS = (
     },
 )
 
-SrgbColor = Annotated[tuple[float, float, float], BeforeValidator(parse_color), OrShort(COLOR_FORMS[0])]
-
 
 def switch(value: object) -> bool | None:
     """True or False for on and off (as read by YAML 1.1 or 1.2), None for any other value."""

@@ -26,11 +26,6 @@ class Made:
     notes: tuple[str, ...]
 
 
-def formats_again() -> tuple[str, ...]:
-    """Names of the formats whose data sets can be rendered again, sorted."""
-    return tuple(_again())
-
-
 def make_again(kind: str, source: Path, folder: Path) -> Made:
     """Make a folder with a recipe that renders a data set again.
 
@@ -52,7 +47,7 @@ def make_again(kind: str, source: Path, folder: Path) -> Made:
 
 
 def _again() -> dict[str, Callable[[Path], SourceCameras]]:
-    return {name: spec.again for name, spec in plugins.loadable(FormatSpec).items() if spec.again is not None}
+    return {name: spec.as_recipe for name, spec in plugins.loadable(FormatSpec).items() if spec.as_recipe is not None}
 
 
 def _check_folder(folder: Path) -> None:

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from viewsphere.model.place import USUAL, Bay, Place, PlacePiece, Traffic, standing
+from viewsphere.model.place import USUAL, Bay, Lane, Place, PlacePiece, Traffic, standing
 from viewsphere.model.scene import Matrix4
 from viewsphere.plugins.place import PlaceSpec
 from viewsphere_zoo import drawing_of
@@ -94,7 +94,9 @@ def neighbourhood(parameters: Neighbourhood | None = None) -> Place:
     stands += _shrubs(plots, green)
     stands += _furniture(plan, plots, props)
     bays, pavements = _bays(plots, stands), street.pavements()
-    pieces = _named([(s.family, s.seed, s.world_from_piece) for s in stands] + _traffic(p.traffic, bays, stands, life))
+    pieces = _named(
+        [(s.family, s.seed, s.world_from_piece) for s in stands] + _traffic(p.traffic, bays, pavements, stands, life)
+    )
     free = (-ROAD, -HALF_LENGTH, ROAD, HALF_LENGTH)
     return Place(pieces, free=free, lanes=street.lanes(), bays=bays, pavements=pavements)
 
@@ -143,7 +145,7 @@ def _around(stand: _Stand) -> float:
 
 
 def _traffic(
-    traffic: Traffic, bays: Sequence[Bay], stands: Sequence[_Stand], rng: np.random.Generator
+    traffic: Traffic, bays: Sequence[Bay], pavements: Sequence[Lane], stands: Sequence[_Stand], rng: np.random.Generator
 ) -> list[tuple[str, int, Matrix4]]:
     """Cars on driveways, and people on the pavements."""
     share = PARKED if traffic.parked is None else traffic.parked
@@ -160,8 +162,7 @@ def _traffic(
     others = [(s.x, s.y, _around(s)) for s in stands[2:]]
     taken = [("car", seed, at) for seed, at in street_life.parked(spots, bays, share, design)]
     return taken + [
-        ("person", int(rng.choice(walking)), at)
-        for at in street_life.walkers(walks, street.pavements(), traffic.walkers, others)
+        ("person", int(rng.choice(walking)), at) for at in street_life.walkers(walks, pavements, traffic.walkers, others)
     ]
 
 

@@ -104,11 +104,9 @@ class _Town:
         name = f"{family}_{self.count[family]}"
         self.pieces.append(PlacePiece(name, family, seed, family.replace("_", " "), world_from_piece))
 
-    def stand(
-        self, family: str, side: Frontage, along: float, inset: float, turn: float = 0.0, kind: str = "", **of: Any
-    ) -> None:
+    def stand(self, family: str, side: Frontage, along: float, inset: float, turn: float = 0.0, kind: str = "") -> None:
         """Add a member of a family on a side of a block, its front to the road unless turned."""
-        seed, _ = self.drawn(family, kind, **of)
+        seed, _ = self.drawn(family, kind)
         self.put(family, seed, *side.at(along, inset), side.turn_deg + turn)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from functools import lru_cache
 from importlib import metadata
 from importlib.util import find_spec
@@ -25,13 +26,12 @@ def _readers(_names: tuple[str, ...], _entries: tuple[metadata.EntryPoint, ...])
 
 def reader_of(suffix: str, *, moving: bool = False) -> ReaderSpec | None:
     """The reader of files with this suffix (without its dot), or the reader of their animations; None if there is none."""
-    known = [one for one in readers().values() if suffix in one.suffixes and (one.frames is not None or not moving)]
-    return min(known, key=lambda one: (not is_installed(one), one.by_blender), default=None)
+    return _best([one for one in readers().values() if one.frames is not None or not moving], suffix)
 
 
-def is_installed(reader: ReaderSpec) -> bool:
-    """Return whether the optional packages of a reader are installed."""
-    return not missing(reader)
+def _best(known: Iterable[ReaderSpec], suffix: str) -> ReaderSpec | None:
+    fitting = (one for one in known if suffix in one.suffixes)
+    return min(fitting, key=lambda one: (bool(missing(one)), one.by_blender), default=None)
 
 
 def missing(reader: ReaderSpec) -> list[str]:
@@ -41,15 +41,12 @@ def missing(reader: ReaderSpec) -> list[str]:
 
 def suffixes(*, by_blender: bool | None = None) -> tuple[str, ...]:
     """Sorted suffixes of model files, without pictures: all, or only those that Blender reads here, or only the others."""
-    known = sorted({suffix for one in readers().values() if not one.is_picture for suffix in one.suffixes})
+    known = readers().values()
+    ordered = sorted({suffix for one in known if not one.is_picture for suffix in one.suffixes})
     if by_blender is None:
-        return tuple(known)
-    return tuple(suffix for suffix in known if _is_by_blender(suffix) == by_blender)
-
-
-def _is_by_blender(suffix: str) -> bool:
-    reader = reader_of(suffix)
-    return reader is not None and reader.by_blender
+        return tuple(ordered)
+    chosen = ((suffix, _best(known, suffix)) for suffix in ordered)
+    return tuple(suffix for suffix, reader in chosen if reader is not None and reader.by_blender == by_blender)
 
 
 def third_party_sources(suffix: str) -> list[Path]:

@@ -22,10 +22,12 @@ from viewsphere.model.fields.frozen import Frozen
 from viewsphere.model.fields.numbers import Length, Metres, Number, Positive
 from viewsphere.model.sensors.camera import Intrinsics
 from viewsphere.plugins.trajectory import TrajectorySpec
-from viewsphere.recipe.cameras.trajectories import LOOK, MOST_POINTS, MOST_TURNS, Look, Moving, Spot
+from viewsphere.recipe.cameras.trajectories import LOOK, MOST_POINTS, Look, Moving, Spot
 from viewsphere.validation.errors import shown
 
 Float = NDArray[np.float64]
+
+MOST_TURNS = 1_000
 
 
 class Turn(Frozen):

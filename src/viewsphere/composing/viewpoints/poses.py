@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Self, overload
+from typing import Any, Self, cast, overload
 
 import numpy as np
 from numpy.typing import NDArray
@@ -473,7 +473,7 @@ def poses(viewpoints: Viewpoints, seed: int, folder: Path = Path()) -> Poses:
         case _:
             raise RecipeError(
                 "viewpoints.kind: expected grid, sphere, normal, jitter or file without time; found "
-                f"{viewpoints.model_dump()['kind']}, which needs time: set time: {{frames: 50, fps: 25}}"
+                f"{cast(Any, viewpoints).kind}, which needs time: set time: {{frames: 50, fps: 25}}"
             )
 
 

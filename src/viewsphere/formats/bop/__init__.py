@@ -51,7 +51,7 @@ from pydantic import Field
 from viewsphere.codecs import tar
 from viewsphere.errors import UserError
 from viewsphere.formats import Scope
-from viewsphere.formats.bop.as_recipe import again
+from viewsphere.formats.bop.as_recipe import source_cameras
 from viewsphere.formats.bop.entries import (
     Entry,
     camera,
@@ -233,5 +233,5 @@ FORMAT = FormatSpec(
     preparer=preparer,
     verify=verify,
     read=read,
-    again=again,
+    as_recipe=source_cameras,
 )

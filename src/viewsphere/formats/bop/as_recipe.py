@@ -55,7 +55,7 @@ SHIFTED = (
 )
 
 
-def again(path: Path) -> SourceCameras:
+def source_cameras(path: Path) -> SourceCameras:
     """Return every picture of a data set of scenes, or of one of its splits, and every model with its symmetries.
 
     Pixels count from the first one's centre, as in BOP, unless masks fit the models clearly better from elsewhere. The world is

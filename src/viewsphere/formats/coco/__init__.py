@@ -32,7 +32,7 @@ from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from viewsphere.formats.coco.categories import Options, notes
+from viewsphere.formats.coco.categories import CHANNELS, Options, notes
 from viewsphere.plugins.format import FormatSpec, Remark
 
 if TYPE_CHECKING:
@@ -81,7 +81,7 @@ FORMAT = FormatSpec(
     holds=("boxes", "masks", "keypoints", "captions", "poses", "3D boxes"),
     read_by=("pycocotools", "torchvision", "datumaro", "supervision", "FiftyOne"),
     options=Options,
-    channels=("rgb",),
+    channels=CHANNELS,
     notes=notes,
     writer=writer,
     preparer=preparer,

@@ -19,8 +19,8 @@ from viewsphere.model.sample import ObjectAnnotation
 if TYPE_CHECKING:
     from viewsphere.store import Category, Dataset
 
-if TYPE_CHECKING:
-    from viewsphere.store import Category, Dataset
+CHANNELS = ("rgb",)
+"""The channels that the format requires."""
 
 KEYPOINTS = "keypoints"
 """The label whose points are exported if a data set has it."""

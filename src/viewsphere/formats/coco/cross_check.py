@@ -27,9 +27,6 @@ from viewsphere.scratch import temporary
 if TYPE_CHECKING:
     from viewsphere.store import Dataset
 
-if TYPE_CHECKING:
-    from viewsphere.store import Dataset
-
 OPENED: tuple[Where, ...] = ((), ("categories",), ("models",), ("images",), ("annotations",))
 """The parts of an instances file that the proof reads and compares item by item."""
 
@@ -170,12 +167,12 @@ def verify(dataset: Dataset, folder: Path, sampled: Collection[int], options: Op
     instance maps, and detections made from these maps must score AP 1.
     """
     names = file_names(dataset)
-    with temporary("coco") as aside:
-        with instances(dataset, aside, options) as append:
+    with temporary("coco") as scratch_folder:
+        with instances(dataset, scratch_folder, options) as append:
             expected, again = _expected(dataset, append, options), _expected(dataset, _nowhere, options)
             yield from check_files(dataset, folder, expected, again, [f"annotations/{name}" for name in names])
         for name in names:
-            yield from check_json(aside / name, folder / "annotations" / name, OPENED, _frame)
+            yield from check_json(scratch_folder / name, folder / "annotations" / name, OPENED, _frame)
         for split in dataset.splits:
             yield from compare_with_pycocotools(dataset, folder / "annotations" / file_name(split), split, sampled, options)
 

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from viewsphere.errors import UserError
 from viewsphere.formats.coco.categories import (
+    CHANNELS,
     Names,
     Options,
     category_ids,
@@ -36,21 +37,12 @@ from viewsphere.store.credits import credited
 if TYPE_CHECKING:
     from viewsphere.store import Dataset
 
-if TYPE_CHECKING:
-    from viewsphere.store import Dataset
-
-if TYPE_CHECKING:
-    from viewsphere.store import Dataset
-
 FOLDER_SIZE = 10_000
 CAPTIONS = "captions"
 """The label whose sentences are exported if a data set has it."""
 
 Masks = Mapping[int, NDArray[np.bool_]]
 """Masks (H, W) of the visible pixels of a sample's visible objects, except imported ones, by the objects' ids."""
-
-
-CHANNELS = ("rgb",)
 
 
 def preparer(dataset: Dataset, folder: Path, options: Options) -> Callable[[Sample], Entry]:

@@ -33,7 +33,7 @@ import numpy as np
 from pydantic import Field
 
 from viewsphere.formats import Scope
-from viewsphere.formats.colmap.as_recipe import again
+from viewsphere.formats.colmap.as_recipe import source_cameras
 from viewsphere.formats.colmap.points import Sights
 from viewsphere.formats.colmap.reading import read
 from viewsphere.formats.colmap.records import KINDS, Camera, Frame, Image, Record, Rig, pose_of
@@ -160,5 +160,5 @@ FORMAT = FormatSpec(
     preparer=preparer,
     verify=verify,
     read=read,
-    again=again,
+    as_recipe=source_cameras,
 )

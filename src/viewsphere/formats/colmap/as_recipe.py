@@ -15,7 +15,7 @@ FOLDERS = ("", "sparse/0", "sparse", "dense/0", "dense")
 """The folders in which COLMAP's programs put meshes, relative to the folder of the data set."""
 
 
-def again(path: Path) -> SourceCameras:
+def source_cameras(path: Path) -> SourceCameras:
     """Return every camera of a folder with `sparse/0`, or of such a `sparse/0`, text or binary, in the order of their images'
     names.
 

@@ -29,13 +29,14 @@ def verify(dataset: Dataset, folder: Path, sampled: Collection[int], options: Op
     exists at a time.
     """
     names = [CARD]
-    with TemporaryDirectory() as aside:
-        shards = Shards(Columns(dataset), Path(aside), options)
+    with TemporaryDirectory() as scratch_folder:
+        shards = Shards(Columns(dataset), Path(scratch_folder), options)
         for name in _all(shards, dataset):
             names.append(name)
             if (folder / name).is_file():
-                yield from ((frame, f"{name}: {what}: export again") for frame, what in _changes(Path(aside), folder, name))
-            (Path(aside) / name).unlink()
+                changes = _changes(Path(scratch_folder), folder, name)
+                yield from ((frame, f"{name}: {what}: export again") for frame, what in changes)
+            (Path(scratch_folder) / name).unlink()
     file = folder / CARD
     if file.is_file() and read_bytes(file) != card(dataset, shards).encode():
         yield None, f"{CARD}: expected the card that is exported, found another: export again"
@@ -48,13 +49,13 @@ def _all(shards: Shards, dataset: Dataset) -> Iterator[str]:
     yield from shards.end()
 
 
-def _changes(aside: Path, folder: Path, name: str) -> Iterator[Remark]:
+def _changes(scratch_folder: Path, folder: Path, name: str) -> Iterator[Remark]:
     """Yield the differences between a file and the file of the same name made for comparison."""
-    if same_bytes(aside / name, folder / name):
+    if same_bytes(scratch_folder / name, folder / name):
         return
     pa = arrow()
     try:
-        ours, theirs = (pa.parquet.ParquetFile(place / name) for place in (aside, folder))
+        ours, theirs = (pa.parquet.ParquetFile(place / name) for place in (scratch_folder, folder))
         with ours, theirs:
             same = ours.schema_arrow.equals(theirs.schema_arrow, check_metadata=True)
             if not same:

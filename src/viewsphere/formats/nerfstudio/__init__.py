@@ -72,7 +72,7 @@ FOLDERS = ("", "exports/mesh", "exports/poisson", "exports/tsdf", "exports")
 """The folders in which nerfstudio's users put meshes, relative to the folder of transforms.json."""
 
 
-def again(path: Path) -> SourceCameras:
+def source_cameras(path: Path) -> SourceCameras:
     """Return every camera of a world's folder, or of one of its files. Pictures are required only if the file does not give w
     and h. Raises StoreError if there is no such file, and for a frame that lacks its lens or its pose.
     """
@@ -216,7 +216,7 @@ FORMAT = FormatSpec(
     preparer=preparer,
     verify=verify,
     read=read,
-    again=again,
+    as_recipe=source_cameras,
 )
 
 

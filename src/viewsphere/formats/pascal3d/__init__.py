@@ -56,7 +56,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from viewsphere.formats import Scope
-from viewsphere.formats.pascal3d.as_recipe import again
+from viewsphere.formats.pascal3d.as_recipe import source_cameras
 from viewsphere.formats.pascal3d.reading import read
 from viewsphere.formats.pascal3d.writing import CLASSES, MOST, Pascal3d
 from viewsphere.formats.shared.viewpoint_mat import Options, no_viewpoints, scipy_io
@@ -99,5 +99,5 @@ FORMAT = FormatSpec(
     preparer=preparer,
     verify=verify,
     read=read,
-    again=again,
+    as_recipe=source_cameras,
 )

@@ -35,7 +35,7 @@ class _Group:
     objects: list[Posed]
 
 
-def again(path: Path) -> SourceCameras:
+def source_cameras(path: Path) -> SourceCameras:
     """Return every picture with objects of known viewpoint, in the folder of a release, and the CAD models that they show.
 
     A picture is one shot if its objects share one lens, as they do if the record gives K. Otherwise it is one shot for each

@@ -152,6 +152,11 @@ class Lens:
     intrinsics: Intrinsics
     parameters: Any
 
+    def positions(self, x: Float, y: Float) -> Float:
+        """The positions (N, 2) in the picture of x and y (N,) to which K applies, that is after distortion."""
+        i = self.intrinsics
+        return np.stack([i.fx * x + i.skew * y + i.cx, i.fy * y + i.cy], axis=-1)
+
     @property
     def name(self) -> str:
         """The name of its model."""
@@ -361,6 +366,6 @@ def _package_with(name: str) -> str:
     named = (entry.module for entry in entry_points(PACKAGES) if entry.name == LensSpec.KIND)
     for package in (*named, __name__):
         with suppress(Exception):
-            if name in dict(listed(package)):
+            if name in listed(package):
                 return package
     raise PluginError(f"lens {name}: expected a lens model of viewsphere or of an installed package; found none")

@@ -42,10 +42,9 @@ def project(lens: Lens, points: Float) -> Float:
     """Positions of points up to the largest angle, including points behind the camera."""
     from viewsphere.geometry.lenses.shared import kernels_lens as kernels
 
-    i, k, out = lens.intrinsics, lens.parameters.coefficients, np.empty((len(points), 2))
+    k, out = lens.parameters.coefficients, np.empty((len(points), 2))
     kernels.distort_fisheye(np.array(k), limit(k), points, out)
-    x, y = out.T
-    return np.stack([i.fx * x + i.skew * y + i.cx, i.fy * y + i.cy], axis=-1)
+    return lens.positions(*out.T)
 
 
 def bounds(

@@ -29,10 +29,8 @@ def rays(lens: Lens, xy: Float) -> Rays:
 
 def project(lens: Lens, points: Float) -> Float:
     """Positions of points in front of the camera."""
-    i = lens.intrinsics
     z = np.where(points[:, 2] > 0, points[:, 2], np.nan)
-    x, y = points[:, 0] / z, points[:, 1] / z
-    return np.stack([i.fx * x + i.skew * y + i.cx, i.fy * y + i.cy], axis=-1)
+    return lens.positions(points[:, 0] / z, points[:, 1] / z)
 
 
 def bounds(

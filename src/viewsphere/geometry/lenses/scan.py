@@ -57,10 +57,9 @@ def project(lens: Lens, points: Float) -> Float:
     """Positions of points in all directions except straight up and down."""
     from viewsphere.geometry.lenses.shared import kernels_lens as kernels
 
-    i, out = lens.intrinsics, np.empty((len(points), 2))
+    out = np.empty((len(points), 2))
     kernels.distort_scan(_angles(lens.parameters), points, out)
-    x, y = out.T
-    return np.stack([i.fx * x + i.skew * y + i.cx, i.fy * y + i.cy], axis=-1)
+    return lens.positions(*out.T)
 
 
 def bounds(
@@ -69,11 +68,10 @@ def bounds(
     """The box of azimuths and rows; the full circle if the triangles span it, or cross both the first and the last column."""
     from viewsphere.geometry.lenses.shared import kernels_scan
 
-    room, (k, skew) = np.empty((len(vertices), 5)), (lens.intrinsics.K, lens.intrinsics.skew)
+    i, room = lens.intrinsics, np.empty((len(vertices), 5))
     u0, v0, u1, v1 = kernels_scan.bounds(vertices, is_used, triangles, R, t, _angles(lens.parameters), room)
-    (fx, _, cx), (_, fy, cy), _ = k.tolist()
-    assert skew == 0
-    return (fx * u0 + cx, fy * v0 + cy, fx * u1 + cx, fy * v1 + cy), True
+    assert i.skew == 0
+    return (i.fx * u0 + i.cx, i.fy * v0 + i.cy, i.fx * u1 + i.cx, i.fy * v1 + i.cy), True
 
 
 def field_of_view(lens: Lens) -> tuple[float, float]:

@@ -71,7 +71,7 @@ def context_of(
 
     `boxes[i]` is the 3D box (8, 3) of object i + 1's model at that instant, in the object's axes. `models[i]` is the path of
     that model in the data set. `real_sizes[i]` is its true size, by default the size that its spec gives in numbers.
-    `traits[i]` returns the model's metadata, for labels that request it. `geometry` is the shot's stage, and `visibility` is
+    `metadata[i]` returns the model's metadata, for labels that request it. `geometry` is the shot's stage, and `visibility` is
     this camera's view of it.
     """
     objects = shot.objects

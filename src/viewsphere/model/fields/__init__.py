@@ -1,1 +1,1 @@
-"""Building blocks of models of data: numbers, frozen models, names of files, messages of validation."""
+"""Building blocks of models of data: numbers, frozen models, names of files."""

@@ -13,7 +13,7 @@ class OmitNone(Frozen):
     OMIT_IF_NONE: ClassVar[tuple[str, ...]] = ()
 
     @model_serializer(mode="wrap")
-    def _without_unsaid(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
+    def _without_none(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
         plain: dict[str, Any] = handler(self)
         for name in self.OMIT_IF_NONE:
             if getattr(self, name) is None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from fnmatch import fnmatchcase
+from typing import Any, cast
 
 from pydantic import JsonValue
 
@@ -41,7 +42,7 @@ def check_redraws(recipe: Recipe) -> None:
         if getattr(recipe, name) is not None and not redraws_frames(recipe):
             raise RecipeError(
                 f"{name}: expected something to draw again, viewpoints of kind sphere, normal or jitter, scene.jitter or "
-                f"scene.company.draw: per_frame; found viewpoints of kind {recipe.viewpoints.model_dump()['kind']} and nothing "
+                f"scene.company.draw: per_frame; found viewpoints of kind {cast(Any, recipe.viewpoints).kind} and nothing "
                 "drawn for each frame"
             )
 

@@ -166,9 +166,6 @@ class RigFile(Frozen):
         return (value,) if isinstance(value, str) else value
 
 
-AnyRig = SensorList | StereoRig | SurroundRig | RigFile
-
-
 def _as_written(value: Any) -> Any:
     """`{file: PATH}` as `{kind: file, path: PATH}`; anything else unchanged."""
     if isinstance(value, Mapping) and "file" in value and not {"kind", "path"} & value.keys():

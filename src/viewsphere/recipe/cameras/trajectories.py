@@ -15,7 +15,6 @@ from viewsphere.recipe.cameras.aim import SHAKE, Bins, Shake
 from viewsphere.recipe.values import shape_of
 
 MOST_POINTS = 10_000
-MOST_TURNS = 1_000
 
 Place = tuple[Metres, Metres, Metres]
 Spot = tuple[Metres, Metres]

@@ -109,7 +109,7 @@ class CameraChecks:
                     x, y = np.array(thing.world_from_object)[:2, 3]
                     raise RecipeError(
                         f"viewpoints: expected the camera outside of all that is placed; found it at "
-                        f"({', '.join(f'{v:.3g}' for v in cameras[i])}) inside {what}, which stands at ({x:.3g}, {y:.3g}): go "
+                        f"{_shown(cameras[i])} inside {what}, which stands at ({x:.3g}, {y:.3g}): go "
                         f"farther away, or, where distance is a share to fill, fill less; with min_visibility, frames that are "
                         f"drawn at random are drawn again"
                     )

@@ -75,7 +75,7 @@ class Stages:
     _boxes: dict[str, Float] = field(default_factory=dict[str, Float])
     _sizes: dict[str, Size] = field(default_factory=dict[str, Size])
     _facts: dict[str, FileFacts] = field(default_factory=dict[str, FileFacts])
-    _traits: dict[str, ModelMetadata] = field(default_factory=dict[str, ModelMetadata])
+    _metadata: dict[str, ModelMetadata] = field(default_factory=dict[str, ModelMetadata])
 
     def model(self, spec: ModelSpec, step: TimeStep | None = None) -> Mesh:
         """The normalised model at a time step (None: its rest pose); raises ModelError if its file cannot be used."""
@@ -110,13 +110,13 @@ class Stages:
     def metadata(self, spec: ModelSpec, step: TimeStep | None = None) -> ModelMetadata:
         """Return the metadata of a model at a time step; raises ModelError as `model` and `metadata_of` do."""
         name = _name(spec, step)
-        if name not in self._traits:
+        if name not in self._metadata:
             mesh = self.model(spec, step)
             facts = self._facts.get(name) or FileFacts(Path(spec.source), "parts", "+z", "-y", 1.0)
             said = metadata_of(spec, mesh, facts, step)
             looks = cache(lambda: appearance_of(self.model(spec, step), said.color, said.material))
-            self._traits[name] = replace(said, looks=looks)
-        return self._traits[name]
+            self._metadata[name] = replace(said, looks=looks)
+        return self._metadata[name]
 
     def real_size(self, spec: ModelSpec, step: TimeStep | None = None) -> Size | None:
         """The model's true (width, height, length) in metres; None if unknown."""

@@ -25,7 +25,6 @@ from viewsphere.labels import (
     labels_of,
     makers,
     object_labels,
-    sample_labels,
     sample_labels_of,
     short_record,
     whole_record,
@@ -52,7 +51,7 @@ def _plain_extra(sample: Sample) -> dict[str, Any]:
     """The fields of the labels of whole pictures as JSON; none without any."""
     if not sample.extra:
         return {}
-    fields = {field.name: field for label in sample_labels().values() for field in label.fields}
+    fields = {field.name: field for label in sample_labels_of(sample.requested) for field in label.fields}
     return {"extra": {name: fields[name].plain(value) for name, value in sample.extra.items()}}
 
 

@@ -132,11 +132,6 @@ def sky_lights(sky: AnySky, sun: Sun | None, has_ground: bool) -> tuple[Distant,
     return tuple(light for light in lights if light is not None)
 
 
-def environment_notes(sky: AnySky) -> tuple[str, ...]:
-    """Return the notes on the picture of an environment, such as its repairs, a sentence each."""
-    return _photographed(_key(sky.file), True).notes if isinstance(sky, Environment) else ()
-
-
 def lamps_on_ground(lights: Lights, extent: Extent) -> Float:
     """Mean irradiance / pi, (3,), from lamps on the ground around the targets, without the light that shadows block.
 
