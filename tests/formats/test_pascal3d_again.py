@@ -130,7 +130,7 @@ def test_what_a_recipe_refuses_names_the_folder_that_is_asked_for(mine, tmp_path
     twice = {str(i): SourceModel(Drafted(f"car/0{i}.off", b"OFF"), kind, name="car") for i, kind in enumerate(("a", "b"))}
     shown = pascal3d.source_cameras(mine)
     shows = replace(shown, models={**shown.models, **twice})
-    monkeypatch.setattr(pascal3d, "FORMAT", pascal3d.FORMAT.model_copy(update={"again": lambda _: shows}))
+    monkeypatch.setattr(pascal3d, "FORMAT", pascal3d.FORMAT.model_copy(update={"as_recipe": lambda _: shows}))
     with pytest.raises(RecipeError, match="expected every model once") as error:
         make_again("pascal3d", mine, tmp_path / "again")
     assert str(tmp_path / "again/models/car/0") in str(error.value) and ".again-" not in str(error.value)

@@ -46,7 +46,7 @@ def doctor(
     """Report features that work on this machine: processor, kernels, optional packages, Blender. Missing ones are no error."""
     if setup_blender:
         _set_up_blender()
-    downloads = _downloads() if setup else {}
+    downloads: Mapping[str, Download] = _downloads() if setup else {}
     for name in setup or ():
         if name not in downloads:
             from viewsphere.validation.errors import one_of
