@@ -5,6 +5,7 @@ import shutil
 import struct
 import tracemalloc
 import zlib
+from contextvars import copy_context
 from pathlib import Path
 from unittest.mock import patch
 
@@ -320,7 +321,7 @@ def test_a_worker_whose_parent_is_gone_ends_quietly(error, tmp_path):
             raise error
 
     with patch("signal.signal"), patch("viewsphere.run.shots.tasks.Worker"):
-        local._serve(Pipe(), tmp_path, None)
+        copy_context().run(local._serve, Pipe(), tmp_path, None)
 
 
 def test_a_plain_path_is_followed_without_looking_at_what_is_above(tmp_path, monkeypatch):

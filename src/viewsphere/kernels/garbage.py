@@ -33,10 +33,15 @@ def importing() -> Generator[None]:
     """
     with pause_collection():
         yield
-        if _spares.get():
+        if spares_imports():
             gc.freeze()
 
 
 def spare_imports() -> None:
     """Let later collections in this process skip the objects left by `importing`, even if some become garbage."""
     _spares.set(True)
+
+
+def spares_imports() -> bool:
+    """Return whether this process has called `spare_imports`."""
+    return _spares.get()
