@@ -13,7 +13,7 @@ from PIL import Image
 from viewsphere import plan
 from viewsphere.assets.exporting.export import export_glb
 from viewsphere.assets.mesh import Mesh
-from viewsphere.assets.srgb import encoded, linear
+from viewsphere.codecs.srgb import encoded, linear
 from viewsphere.model.sensors.camera import Camera
 from viewsphere.run.shots.stages import Stages
 

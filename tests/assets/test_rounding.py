@@ -16,7 +16,7 @@ from viewsphere.assets.mesh import Image, Material, Mesh, Texture
 from viewsphere.assets.primitive import Primitive
 from viewsphere.assets.readers.shared import polygon
 from viewsphere.assets.readers.shared.smoothing import angle_of, creased
-from viewsphere.assets.srgb import encoded, linear
+from viewsphere.codecs.srgb import encoded, linear
 
 PROGRAM = """
 import sys

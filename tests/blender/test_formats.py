@@ -20,8 +20,8 @@ from viewsphere.assets.cache import load
 from viewsphere.assets.inspect import describe
 from viewsphere.assets.load import load_model
 from viewsphere.assets.sandbox.client import READ_HERE
-from viewsphere.assets.srgb import linear
 from viewsphere.blender.interpreter import VARIABLE
+from viewsphere.codecs.srgb import linear
 from viewsphere.errors import ModelError
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.planning.models import model_specs

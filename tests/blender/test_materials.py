@@ -14,8 +14,8 @@ import pytest
 from blender_scenes import UPRIGHT, Scene, ball, camera, card, flat_image, raster_stage, rectangle, rendered
 
 from viewsphere.assets.mesh import WRAPS, Image, Material, Texture
-from viewsphere.assets.srgb import encoded
 from viewsphere.codecs.exr import encode_exr
+from viewsphere.codecs.srgb import encoded
 from viewsphere.engines.raster.shading.painting import paint
 from viewsphere.model import scene as model
 from viewsphere.rendering.view import EXPOSURE

@@ -10,7 +10,7 @@ from test_raster import box, mesh_of
 import viewsphere_zoo as zoo
 from shots import still_shot
 from viewsphere.assets.mesh import Material, Mesh
-from viewsphere.assets.srgb import encoded, linear
+from viewsphere.codecs.srgb import encoded, linear
 from viewsphere.engines import raster
 from viewsphere.model.instant import Viewpoint
 from viewsphere.model.model_spec import ModelSpec

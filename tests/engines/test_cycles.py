@@ -14,8 +14,8 @@ from cycles_scenes import DRAFT, HAIR_DRIER, asked, moved_camera, recipe_of, shi
 
 from built_once import built_once
 from viewsphere import render
-from viewsphere.assets.srgb import linear
 from viewsphere.blender.process import BlenderProcess
+from viewsphere.codecs.srgb import linear
 from viewsphere.engines.shared.blender.border import border_of
 from viewsphere.engines.shared.blender.staging import keeper_of
 from viewsphere.errors import BlenderDied, UserError

@@ -11,7 +11,7 @@ from cycles_scenes import asked
 
 from shots import still_shot
 from viewsphere.assets.mesh import Image, Material, Mesh, Texture
-from viewsphere.assets.srgb import encoded
+from viewsphere.codecs.srgb import encoded
 from viewsphere.engines import cycles
 from viewsphere.engines.shared.blender.texels import BUMPED, CONTENTS, FINEST, Kind, halved, spread_of
 from viewsphere.geometry.camera import orbit_center, orbit_rotation

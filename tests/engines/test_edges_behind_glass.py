@@ -11,7 +11,7 @@ from test_raster import CARD_UV, box, camera, card, mesh_of, picture, stage_of, 
 
 from quick import quick
 from viewsphere.assets.mesh import Image, Material, Texture
-from viewsphere.assets.srgb import linear as linear_light
+from viewsphere.codecs.srgb import linear as linear_light
 from viewsphere.engines.raster.antialiasing.samples import differs_behind, edge_samples, layers
 from viewsphere.geometry.lenses import lens_parameters
 from viewsphere.model.scene import Background, Finish, Scene, ViewTransform

@@ -18,8 +18,8 @@ import pytest
 from cycles_scenes import moved_camera, recipe_of, shift_between, stage_of
 
 from viewsphere import render
-from viewsphere.assets.srgb import linear
 from viewsphere.blender.interpreter import probe
+from viewsphere.codecs.srgb import linear
 from viewsphere.engines.shared.blender.border import border_of
 from viewsphere.engines.shared.blender.staging import Keeper, clip_of, keeper_of
 from viewsphere.errors import UserError

@@ -13,7 +13,7 @@ import pytest
 from quick import quick
 from shots import painted, still_shot
 from viewsphere.assets.mesh import Material
-from viewsphere.assets.srgb import encoded, linear
+from viewsphere.codecs.srgb import encoded, linear
 from viewsphere.engines import raster
 from viewsphere.geometry.camera import pixel_rays, project
 from viewsphere.geometry.lenses import lens_parameters

@@ -9,7 +9,7 @@ import pytest
 from material_blocks import FRONT, card, flat_image, made, packed, view_of
 
 from viewsphere.assets.mesh import Image, Material, Texture
-from viewsphere.assets.srgb import linear
+from viewsphere.codecs.srgb import linear
 from viewsphere.model.scene import Ground
 from viewsphere.model.thing import Repaint
 

@@ -16,7 +16,7 @@ from light_stage import ball, cuboid, flat, quad
 from quick import quick
 from shots import painted, still_shot
 from viewsphere.assets.mesh import Image, Material, Mesh, Texture
-from viewsphere.assets.srgb import encoded, linear
+from viewsphere.codecs.srgb import encoded, linear
 from viewsphere.engines import raster
 from viewsphere.engines.raster.shading.painting import paint
 from viewsphere.geometry.camera import orbit_center, orbit_rotation, pixel_rays

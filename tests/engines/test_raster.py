@@ -10,8 +10,8 @@ import pytest
 
 from shots import painted, still_shot
 from viewsphere.assets.mesh import Image, Material, Mesh, Texture
-from viewsphere.assets.srgb import encoded
-from viewsphere.assets.srgb import linear as linear_light
+from viewsphere.codecs.srgb import encoded
+from viewsphere.codecs.srgb import linear as linear_light
 from viewsphere.engines import raster
 from viewsphere.errors import UserError
 from viewsphere.geometry.camera import orbit_center, orbit_rotation

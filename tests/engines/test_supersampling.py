@@ -8,7 +8,7 @@ from test_edges_behind_glass import LENSES, turned
 from test_raster import camera, card, mesh_of, picture, stage_of, unlit
 
 from shots import with_camera
-from viewsphere.assets.srgb import linear
+from viewsphere.codecs.srgb import linear
 from viewsphere.engines import raster
 from viewsphere.engines.raster.staging import larger
 from viewsphere.errors import RecipeError

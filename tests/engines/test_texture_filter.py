@@ -8,7 +8,7 @@ from called import called
 from material_blocks import card, edges_of, made, packed, view_of
 
 from viewsphere.assets.mesh import Image, Material, Texture
-from viewsphere.assets.srgb import linear
+from viewsphere.codecs.srgb import linear
 from viewsphere.engines.raster.materials import kernels_filter as kf
 from viewsphere.engines.raster.materials import kernels_material as km
 from viewsphere.engines.raster.materials.bundles import BundlePacker

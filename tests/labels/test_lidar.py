@@ -8,9 +8,9 @@ from PIL import Image
 
 import viewsphere as vs
 from sealing import seal_again
-from viewsphere.assets.srgb import linear
 from viewsphere.check import check
 from viewsphere.codecs.npz import decode_npz, encode_npz
+from viewsphere.codecs.srgb import linear
 from viewsphere.errors import RecipeError
 from viewsphere.formats.blend import is_camera_view
 from viewsphere.labels import is_shown

@@ -14,8 +14,8 @@ from viewsphere.assets.appearance.pbr import pictures_of
 from viewsphere.assets.appearance.repaint import textured
 from viewsphere.assets.mesh import Material
 from viewsphere.assets.primitive import face_normals
-from viewsphere.assets.srgb import linear
 from viewsphere.check import check
+from viewsphere.codecs.srgb import linear
 from viewsphere.errors import RecipeError
 from viewsphere.geometry.box3d import Box3d
 from viewsphere.materials import brick as brick_module

@@ -13,7 +13,7 @@ from scipy.ndimage import gaussian_filter
 
 from pictures import photograph, write
 from quick import quick
-from viewsphere.assets.srgb import encoded, linear
+from viewsphere.codecs.srgb import encoded, linear
 from viewsphere.errors import UserError
 from viewsphere.model.scene import Background
 from viewsphere.rendering import background as module

@@ -8,7 +8,7 @@ import math
 import numpy as np
 import pytest
 
-from viewsphere.assets.srgb import linear
+from viewsphere.codecs.srgb import linear
 from viewsphere.model.scene import Background, Effects, Finish, Smoother, ViewTransform
 from viewsphere.model.sensors.camera import Intrinsics
 from viewsphere.rendering.effects import apply_effects, has_effects

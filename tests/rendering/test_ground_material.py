@@ -9,7 +9,7 @@ import pytest
 
 from pictures import bricks, write
 from viewsphere.assets.paths.folder import SHARPEST
-from viewsphere.assets.srgb import linear
+from viewsphere.codecs.srgb import linear
 from viewsphere.errors import UserError
 from viewsphere.model.scene import Ground
 from viewsphere.rendering.ground.material import ground_albedo, ground_frame, ground_material

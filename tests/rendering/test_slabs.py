@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from viewsphere.assets.srgb import linear
+from viewsphere.codecs.srgb import linear
 from viewsphere.engines.shared.blender.requests import TEXELS, laid_with_slabs
 from viewsphere.model.scene import Ground
 from viewsphere.rendering.ground.kernels_slabs import JOINT, shades

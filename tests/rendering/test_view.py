@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from viewsphere.assets.srgb import linear
+from viewsphere.codecs.srgb import linear
 from viewsphere.model.scene import ViewTransform
 from viewsphere.rendering.view import EXPOSURE, KNEE, TRANSFORMS, agx_sigmoid, develop, srgb_bytes, to_bytes, to_display_linear
 from viewsphere.rendering.white import XYZ_FROM_SRGB, white_balance, white_xyz

@@ -10,7 +10,7 @@ import pytest
 from pictures import photograph, write
 from quick import quick
 from shots import still_shot
-from viewsphere.assets.srgb import encoded, linear
+from viewsphere.codecs.srgb import encoded, linear
 from viewsphere.model.instant import Viewpoint
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.scene import Background, Finish, Ground, Scene

@@ -37,8 +37,8 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from viewsphere.assets.srgb import encoded
 from viewsphere.codecs.png_tiff import encode_png
+from viewsphere.codecs.srgb import encoded
 from viewsphere.errors import UserError
 from viewsphere.formats import Scope
 from viewsphere.formats.shared.writing import refusals

@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING, NoReturn
 import numpy as np
 from numpy.typing import NDArray
 
-from viewsphere.assets.srgb import linear
 from viewsphere.codecs.orientation import SWAPPED, orientation
+from viewsphere.codecs.srgb import linear
 from viewsphere.errors import RecipeError
 from viewsphere.files import open_file
 from viewsphere.limits import limits

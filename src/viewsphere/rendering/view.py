@@ -28,7 +28,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from viewsphere.assets.srgb import encoded
+from viewsphere.codecs.srgb import encoded
 from viewsphere.model.scene import ViewTransform
 from viewsphere.rendering.white import white_balance
 

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewsphere.assets.mesh import Mesh
-from viewsphere.assets.srgb import encoded
+from viewsphere.codecs.srgb import encoded
 from viewsphere.report.unknown import numbers
 
 Float = NDArray[np.float64]

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Literal
 
-from viewsphere.assets import srgb
 from viewsphere.assets.mesh import Material
+from viewsphere.codecs import srgb
 
 Color = tuple[float, float, float]
 Finish = Literal["gloss", "matte", "metal"]

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from viewsphere.assets import srgb
 from viewsphere.assets.mesh import Image, Material
+from viewsphere.codecs import srgb
 from viewsphere_zoo.shapes.assembly import Piece
 from viewsphere_zoo.shapes.paint import linear
 from viewsphere_zoo.shapes.solids import Float, Solid, grid, join, moved, turned

@@ -9,7 +9,7 @@ from truth_scenes import cube
 from viewsphere.assets.appearance.color_names import NAMES, nearest_names, oklab
 from viewsphere.assets.appearance.description import appearance_of, is_alike, words
 from viewsphere.assets.mesh import Image, Material, Mesh, Texture
-from viewsphere.assets.srgb import linear
+from viewsphere.codecs.srgb import linear
 from viewsphere.model.thing import Repaint
 
 RED, BLACK, GREEN = (0.6, 0.02, 0.02, 1.0), (0.01, 0.01, 0.01, 1.0), (0.02, 0.3, 0.05, 1.0)

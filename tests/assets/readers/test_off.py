@@ -5,7 +5,7 @@ import pytest
 
 from polygons import triangle_areas
 from viewsphere.assets.load import load_model
-from viewsphere.assets.srgb import linear
+from viewsphere.codecs.srgb import linear
 from viewsphere.errors import ModelError
 
 SQUARE = ["-1 0 -1", "1 0 -1", "1 0 1", "-1 0 1"]

@@ -14,7 +14,7 @@ from polygons import triangle_areas
 from viewsphere.assets.load import load_model
 from viewsphere.assets.paths.folder import ModelFolder
 from viewsphere.assets.readers.ply.data import Lists, read_elements
-from viewsphere.assets.srgb import linear
+from viewsphere.codecs.srgb import linear
 from viewsphere.errors import ModelError
 
 XYZ = ["float x", "float y", "float z"]

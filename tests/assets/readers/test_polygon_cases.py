@@ -7,7 +7,7 @@ import pytest
 
 from polygons import triangle_areas
 from viewsphere.assets.load import load_model
-from viewsphere.assets.srgb import linear
+from viewsphere.codecs.srgb import linear
 
 CASES = Path(__file__).parents[4] / "shared" / "cases" / "models"
 BALL = (0.36, 0.2988, 0.013)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from viewsphere.assets.srgb import linear, root
+from viewsphere.codecs.srgb import linear, root
 
 PROTOTYPES = {
     "black": ("#000000", "#262626"),

@@ -13,7 +13,7 @@ from viewsphere.assets.appearance.color_names import NAMES, nearest_names
 from viewsphere.assets.appearance.pbr import color_of, is_replaceable
 from viewsphere.assets.mesh import Material, Mesh, Texture
 from viewsphere.assets.primitive import face_normals
-from viewsphere.assets.srgb import linear
+from viewsphere.codecs.srgb import linear
 from viewsphere.materials import word
 from viewsphere.model.annotations.appearance import Appearance, Patch
 from viewsphere.model.thing import Repaint

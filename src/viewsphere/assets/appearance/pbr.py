@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from viewsphere import materials
 from viewsphere.assets.appearance.color_names import NAMES, nearest_names
 from viewsphere.assets.mesh import Image, Material, Texture
-from viewsphere.assets.srgb import encoded, linear
+from viewsphere.codecs.srgb import encoded, linear
 from viewsphere.model.annotations.procedural_material import ProceduralMaterial
 from viewsphere.model.scene import WHITE, Color
 

@@ -14,8 +14,8 @@ from viewsphere.assets.animation.deforming import DeformingMesh
 from viewsphere.assets.exporting.glb import deforming_glb_bytes, glb_bytes
 from viewsphere.assets.exporting.runs import runs
 from viewsphere.assets.mesh import Material, Mesh, Texture
-from viewsphere.assets.srgb import encoded
 from viewsphere.codecs.png_tiff import encode_png
+from viewsphere.codecs.srgb import encoded
 from viewsphere.model.model_spec import step_key
 
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from viewsphere.assets.appearance.wetting import darkened
-from viewsphere.assets.srgb import encoded, linear
+from viewsphere.codecs.srgb import encoded, linear
 from viewsphere.model.scene import HemisphereLight, Scene
 from viewsphere.model.weather import CONTRAST, Fog, Lamps, Rain, Snow, Wet
 from viewsphere.recipe.draws import RngOf, drawn

@@ -11,7 +11,7 @@ import xxhash
 from numpy.typing import NDArray
 
 from viewsphere.assets.mesh import Mesh
-from viewsphere.assets.srgb import linear
+from viewsphere.codecs.srgb import linear
 from viewsphere.engines.raster.indirect.bounce_scene import BounceScenes
 from viewsphere.engines.raster.indirect.bounces import bake_bounces, tree_of_scene
 from viewsphere.engines.raster.materials.kernels_material import L_BLENDED, L_METAL, L_METAL_TEXEL, L_TRANSMISSION

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from viewsphere.assets.appearance.repaint import repainted
 from viewsphere.assets.mesh import Image, Material, Mesh, Texture, Wrap
-from viewsphere.assets.srgb import linear
+from viewsphere.codecs.srgb import linear
 from viewsphere.model.scene import Ground
 from viewsphere.model.thing import Repaint
 from viewsphere.rendering.ground.material import ground_frame, ground_material

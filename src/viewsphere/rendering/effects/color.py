@@ -8,7 +8,7 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
-from viewsphere.assets.srgb import linear
+from viewsphere.codecs.srgb import linear
 
 Float32 = NDArray[np.float32]
 

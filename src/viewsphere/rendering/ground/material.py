@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from viewsphere.assets.appearance.opaque import Stamp, opaque_picture, stamp_of
 from viewsphere.assets.appearance.pbr import made_of, pictures_of
 from viewsphere.assets.mesh import Image, Material, Texture
-from viewsphere.assets.srgb import linear
+from viewsphere.codecs.srgb import linear
 from viewsphere.model.scene import Ground
 
 SLABS = 2

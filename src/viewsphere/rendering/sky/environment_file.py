@@ -111,7 +111,7 @@ def _read_hdr(path: Path, head: HdrHead) -> Float32:
 def _read_ordinary(path: Path) -> Float32:
     from PIL import Image, UnidentifiedImageError
 
-    from viewsphere.assets.srgb import linear
+    from viewsphere.codecs.srgb import linear
 
     try:
         with open_file(path, "MAX_PICTURE_BYTES") as file, Image.open(file) as image:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from viewsphere.assets.mesh import HIGHEST_IOR, Image, Material, Texture
 from viewsphere.assets.paths.folder import ModelFolder
-from viewsphere.assets.srgb import linear, srgb_bytes
+from viewsphere.codecs.srgb import linear, srgb_bytes
 
 Float = NDArray[Any]
 Told = Mapping[str, Any]

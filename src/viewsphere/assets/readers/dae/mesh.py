@@ -17,7 +17,7 @@ from viewsphere.assets.readers.shared.coordinates import check_coordinates
 from viewsphere.assets.readers.shared.polygon_holes import without_holes
 from viewsphere.assets.readers.shared.polygon_proof import cut_polygons
 from viewsphere.assets.readers.shared.smoothing import row_numbers
-from viewsphere.assets.srgb import linear
+from viewsphere.codecs.srgb import linear
 
 LINES = frozenset({"lines", "linestrips"})
 WIDEST = 64

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from viewsphere.assets.mesh import Image, Material, Texture
 from viewsphere.assets.paths.folder import ModelFolder
-from viewsphere.assets.srgb import linear, srgb_bytes
+from viewsphere.codecs.srgb import linear, srgb_bytes
 
 Float = NDArray[np.float64]
 Bytes = NDArray[np.uint8]

@@ -21,7 +21,7 @@ from viewsphere.assets.readers.shared.coordinates import check_coordinates
 from viewsphere.assets.readers.shared.polygon_proof import cut_polygons
 from viewsphere.assets.readers.shared.smoothing import creased
 from viewsphere.assets.readers.shared.text import number_of, numeric_words, statements, uncommented
-from viewsphere.assets.srgb import linear
+from viewsphere.codecs.srgb import linear
 from viewsphere.errors import ModelError
 
 LEFT_OUT = {"l": "line", "p": "point", "curv": "curve", "curv2": "curve", "surf": "surface"}

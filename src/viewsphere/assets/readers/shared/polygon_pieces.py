@@ -13,7 +13,7 @@ from viewsphere.assets.primitive import Float, Int, Primitive, compact
 from viewsphere.assets.readers.shared.coordinates import check_coordinates
 from viewsphere.assets.readers.shared.polygon_proof import cut_polygons
 from viewsphere.assets.readers.shared.smoothing import creased
-from viewsphere.assets.srgb import linear
+from viewsphere.codecs.srgb import linear
 
 BYTE = 255.0
 BEYOND_ONE = 2.0

@@ -12,7 +12,7 @@ from viewsphere.assets.paths.folder import ModelFolder
 from viewsphere.assets.primitive import FileFacts, Float, Primitive, assemble
 from viewsphere.assets.readers.shared.coordinates import check_coordinates
 from viewsphere.assets.readers.shared.smoothing import creased
-from viewsphere.assets.srgb import linear
+from viewsphere.codecs.srgb import linear
 
 HEADER = 84
 BOM = b"\xef\xbb\xbf"

@@ -13,7 +13,7 @@ from viewsphere.assets.paths.folder import ModelFolder
 from viewsphere.assets.primitive import Float, Int, Primitive, compact
 from viewsphere.assets.readers.shared.smoothing import split
 from viewsphere.assets.readers.threemf.object import NOTHING, Object, Triangles
-from viewsphere.assets.srgb import linear
+from viewsphere.codecs.srgb import linear
 
 TILES: dict[str, Wrap] = {"wrap": "repeat", "mirror": "mirror", "clamp": "clamp", "none": "clamp"}
 

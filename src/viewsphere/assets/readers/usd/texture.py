@@ -17,7 +17,7 @@ from viewsphere.assets.paths.folder import ModelFolder
 from viewsphere.assets.primitive import Float
 from viewsphere.assets.readers.usd.layers import asset_bytes
 from viewsphere.assets.readers.usd.library import UsdShade
-from viewsphere.assets.srgb import linear, srgb_bytes
+from viewsphere.codecs.srgb import linear, srgb_bytes
 
 WRAPS: dict[str, Wrap] = {"repeat": "repeat", "mirror": "mirror", "clamp": "clamp", "black": "clamp"}
 """Wrap modes; the mode in the file (`useMetadata`) counts as repeat, since texture files rarely store one."""

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewsphere.assets.mesh import WRAPS, Image, Material, Texture
-from viewsphere.assets.srgb import linear
+from viewsphere.codecs.srgb import linear
 from viewsphere.engines.raster.materials.kernels_filter import PLANES
 from viewsphere.engines.raster.materials.kernels_material import BASE, BUMP, COAT_BUMP, GLOW, ROUGHNESS, SPECULAR_COLOR
 from viewsphere.engines.raster.materials.kernels_mips import ZERO_NORMAL, fill, fill_normals, halve

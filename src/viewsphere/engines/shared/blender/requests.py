@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from viewsphere.assets.appearance.repaint import repainted
 from viewsphere.assets.mesh import Image, Material, Mesh, Texture
-from viewsphere.assets.srgb import encoded
+from viewsphere.codecs.srgb import encoded
 from viewsphere.engines.shared.blender.file_frame import FileFrame
 from viewsphere.engines.shared.blender.options import AnyOptions
 from viewsphere.engines.shared.blender.texels import Kind, Levels

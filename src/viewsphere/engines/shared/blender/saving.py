@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 
 from viewsphere.assets.animation.deforming import Load
-from viewsphere.assets.srgb import encoded
 from viewsphere.codecs.png_tiff import encode_png
+from viewsphere.codecs.srgb import encoded
 from viewsphere.engines.shared.blender.file_frame import FileFrame
 from viewsphere.engines.shared.blender.requests import members_of
 from viewsphere.engines.shared.blender.staging import STAGE_SECONDS, Arrangement, build_stage, camera_request

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from viewsphere.assets.appearance.repaint import repainted
 from viewsphere.assets.mesh import Image, Material, Mesh, Texture
-from viewsphere.assets.srgb import encoded, linear
+from viewsphere.codecs.srgb import encoded, linear
 from viewsphere.geometry.rotation import transform
 from viewsphere.model.sensors.camera import Camera
 from viewsphere.model.thing import Repaint, Thing
