@@ -61,6 +61,32 @@ class LensParameters(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False
         return tuple(float(number) for value in values for number in np.ravel(value))
 
 
+class LensOptions(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False, defer_build=True):
+    """The fields of a recipe's camera beside `projection` and `size`; each lens that a recipe may name so has its own class."""
+
+    projection: str = Field(description="name of the lens")
+
+    @model_serializer(mode="wrap")
+    def _with_projection(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        return {"projection": self.projection, **handler(self)}  # also where defaults are left out
+
+    def calibration(self, size: tuple[int, int]) -> Calibration:
+        """K and the parameters of the lens for a picture of this size (width, height)."""
+        calibrate = _spec(self.projection).calibrate
+        assert calibrate is not None
+        return calibrate(self, size)
+
+
+class Calibration(NamedTuple):
+    """The entries of K, pixels, and the parameters of the lens, without those that follow from the picture's size."""
+
+    fx: float
+    fy: float
+    cx: float
+    cy: float
+    distortion: LensParameters
+
+
 class Rays(NamedTuple):
     """Rays in camera axes: origins and directions (..., 3), metres. NaN directions where a lens has no ray."""
 
@@ -92,6 +118,16 @@ class LensSpec(BaseModel):
     parameters: type[LensParameters] = Field(
         description="the class of the parameters in `distortion` of a recipe, a subclass of "
         "`viewsphere.geometry.lenses.LensParameters`"
+    )
+    options: type[LensOptions] | None = Field(
+        default=None,
+        description="the class of the fields beside `projection: <its name>` of a recipe's camera, a subclass of "
+        "`viewsphere.geometry.lenses.LensOptions`. Default: recipes name the lens as `distortion` alone",
+    )
+    calibrate: Callable[[Any, tuple[int, int]], Calibration] | None = Field(
+        default=None,
+        description="`calibrate(options, size)`: K and the parameters that follow from `options` for a picture of size (width, "
+        "height); raises ValueError for a size that the lens cannot have",
     )
     rays: Callable[[Any, Float], Rays] = Field(
         description="`rays(lens, xy)`: the rays through positions (N, 2) of the picture, in camera axes, NaN where there is "
@@ -141,6 +177,8 @@ class LensSpec(BaseModel):
         except ValidationError as error:
             raise mistakes(cls, error, data) from None
         check_calls(made)
+        if (made.options is None) != (made.calibrate is None):
+            raise PluginError("LensSpec: expected options and calibrate together; found one of them")
         return made
 
 

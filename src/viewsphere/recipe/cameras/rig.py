@@ -11,14 +11,15 @@ from viewsphere.model.fields.frozen import Frozen
 from viewsphere.model.fields.numbers import Count, Length, Metres, Number, Positive
 from viewsphere.recipe.cameras.lens import DistortionField
 from viewsphere.recipe.cameras.lidar import LidarEntry
+from viewsphere.recipe.cameras.projection import WithProjection
 from viewsphere.recipe.values import OrShort, pair
 from viewsphere.recipe.world.scene import CameraEntry, CameraMatrix, PictureSize, Row
 from viewsphere.validation.errors import shown
 
 MOST_SENSORS = 64
 AXES = "OpenCV axes of the first sensor: x right, y down, z forward"
-OWN_LENSES = ("fov_deg", "focal_px", "K")
-LENS_FIELDS = ("size", "fov_deg", "fov_axis", "focal_px", "focal_mm", "sensor_mm", "K", "principal_point", "distortion")
+OWN_LENSES = ("fov_deg", "focal_px", "K", "projection")
+LENS_FIELDS = ("size", *(name for name in CameraEntry.LENS if name != "of_viewpoints"), "projection")
 
 SensorName = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]*$", max_length=64)]
 Place = tuple[Metres, Metres, Metres]
@@ -34,8 +35,10 @@ def _is_of_lists(value: object) -> bool:
     return isinstance(value, (list, tuple)) and any(isinstance(row, (list, tuple)) for row in cast("Sequence[object]", value))
 
 
-class SensorEntry(Frozen):
+class SensorEntry(WithProjection):
     """A sensor's mounting, and its own lens and channels."""
+
+    LENS = ("fov_deg", "fov_axis", "focal_px", "K", "distortion", "lidar")
 
     position: Place = Field(default=(0.0, 0.0, 0.0), description=f"[x, y, z] in metres; {AXES}")
     rotation: Rotation | None = Field(
@@ -102,7 +105,8 @@ class SensorEntry(Frozen):
             raise ValueError(
                 "expected fov_deg, focal_px or K beside distortion, as the camera's lens is its file's; found none"
             )
-        theirs = {n: v for n in LENS_FIELDS if (v := getattr(camera, n)) is not None and (n == "size" or not states)}
+        shared = ("size",) if states else (name for name in LENS_FIELDS if name in camera.model_fields_set)
+        theirs = {name: value for name in shared if (value := getattr(camera, name)) is not None}
         return CameraEntry.model_validate(theirs | mine)
 
 

@@ -18,13 +18,15 @@ from pydantic import (
     model_validator,
 )
 
+from viewsphere.errors import RecipeError
 from viewsphere.geometry.camera import focal_from_sensor
-from viewsphere.geometry.lenses import focal_from_fov
+from viewsphere.geometry.lenses import LensOptions, focal_from_fov
 from viewsphere.model.fields.frozen import Frozen
 from viewsphere.model.fields.numbers import Count, Number, Positive
 from viewsphere.model.scene import WEATHER
 from viewsphere.model.sensors.camera import Intrinsics
 from viewsphere.recipe.cameras.lens import DistortionField
+from viewsphere.recipe.cameras.projection import WithProjection
 from viewsphere.recipe.draws import Drawn, alternatives, is_random
 from viewsphere.recipe.lights import LightsField, spec_of
 from viewsphere.recipe.values import OrShort, pair
@@ -50,7 +52,7 @@ from viewsphere.validation.errors import error_at, shown, told_of
 LARGEST_IMAGE = 16384
 OF_FILE = ("place", "sun", "sky", "ground")
 """Fields that a recipe with a .blend scene must not have, because the file defines them."""
-LENSES = ("fov_deg", "focal_px", "focal_mm", "K", "of_viewpoints")
+LENSES = ("fov_deg", "focal_px", "focal_mm", "K", "of_viewpoints", "projection")
 
 Row = tuple[Number, Number, Number]
 Pixels = Annotated[Count, Field(le=LARGEST_IMAGE)]
@@ -89,8 +91,10 @@ FocalField = Annotated[
 ]
 
 
-class CameraEntry(Frozen):
+class CameraEntry(WithProjection):
     """Image size, and one description of the lens."""
+
+    LENS = ("fov_deg", "fov_axis", "focal_px", "focal_mm", "sensor_mm", "K", "principal_point", "distortion", "of_viewpoints")
 
     size: PictureSize = Field(default=(640, 480), description="[width, height] of the image in pixels")
     fov_deg: Drawn[Annotated[Number, Field(gt=0, lt=180)]] | None = Field(
@@ -143,7 +147,9 @@ class CameraEntry(Frozen):
         given = [name for name in LENSES if getattr(self, name) is not None]
         if len(given) != 1:
             names = " and ".join(given) or "none"
-            raise ValueError(f"expected one of fov_deg, focal_px, focal_mm with sensor_mm, K, of_viewpoints; found {names}")
+            raise ValueError(
+                f"expected one of fov_deg, focal_px, focal_mm with sensor_mm, K, of_viewpoints, projection; found {names}"
+            )
         if self.of_viewpoints and (self.size != type(self).model_fields["size"].default or self.distortion):
             raise ValueError("expected no size and no distortion beside of_viewpoints, which says both; found one")
         if (self.focal_mm is None) != (self.sensor_mm is None):
@@ -161,6 +167,8 @@ class CameraEntry(Frozen):
     def intrinsics(self) -> Intrinsics:
         """The lens as focal lengths and principal point in pixels, once it is drawn."""
         width, height = self.size
+        if self.projection is not None:
+            return _calibrated(self.projection, self.size)
         cx, cy = self.principal_point or (width / 2, height / 2)
         skew = 0.0
         if self.K is not None:
@@ -177,6 +185,15 @@ class CameraEntry(Frozen):
             fx = fy = focal_from_fov(math.radians(self.fov_deg), across, self.distortion)
         with told_of("camera"):
             return Intrinsics(width=width, height=height, fx=fx, fy=fy, cx=cx, cy=cy, skew=skew, distortion=self.distortion)
+
+
+def _calibrated(options: LensOptions, size: tuple[int, int]) -> Intrinsics:
+    try:
+        calibration = options.calibration(size)
+    except ValueError as error:
+        raise RecipeError(f"camera: {error}") from None
+    with told_of("camera"):
+        return Intrinsics(width=size[0], height=size[1], **calibration._asdict())
 
 
 class SceneEntry(Frozen):

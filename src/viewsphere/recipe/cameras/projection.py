@@ -1,0 +1,114 @@
+"""Lenses that a recipe names by `projection`, each with options of its own beside it: a camera's, or a sensor's of a rig."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Annotated, Any, ClassVar, cast
+
+from pydantic import (
+    BeforeValidator,
+    Field,
+    GetJsonSchemaHandler,
+    SerializeAsAny,
+    SerializerFunctionWrapHandler,
+    ValidationError,
+    WithJsonSchema,
+    model_serializer,
+    model_validator,
+)
+from pydantic.json_schema import JsonSchemaValue
+from pydantic_core import CoreSchema
+
+from viewsphere import plugins
+from viewsphere.geometry.lenses import LensOptions
+from viewsphere.model.fields.frozen import Frozen
+from viewsphere.plugins.lens import LensSpec
+from viewsphere.validation.errors import error_at, explained, one_of, shown
+
+
+def _projections() -> dict[str, type[LensOptions]]:
+    """The classes of options of all lenses that `projection` may name, by the lenses' names."""
+    return {name: spec.options for name, spec in plugins.loadable(LensSpec).items() if spec.options is not None}
+
+
+def _options_of(name: Any) -> type[LensOptions]:
+    """The class of options of a lens; raises ValueError for other names, and PluginError for a lens that cannot be loaded."""
+    is_lens = isinstance(name, str) and name in plugins.names("lenses")
+    options = plugins.load(LensSpec, name).options if is_lens else None
+    if options is None:
+        with error_at("projection"):
+            raise ValueError(one_of(name, tuple(_projections())))
+    return options
+
+
+def _named(value: Any) -> Any:
+    if isinstance(value, LensOptions):
+        return value
+    raise ValueError(f"expected the name of a lens; found {shown(value)}")
+
+
+ProjectionField = Annotated[SerializeAsAny[LensOptions], BeforeValidator(_named), WithJsonSchema({"type": "string"})]
+"""The options of a lens. A recipe has its name, and the other options beside it."""
+
+
+class WithProjection(Frozen):
+    """A mapping that may name a lens as `projection`, and then has the lens's options as fields of its own. `LENS` lists the
+    fields that describe a lens in another way, which it may not have beside it.
+    """
+
+    LENS: ClassVar[tuple[str, ...]] = ()
+
+    projection: ProjectionField | None = Field(
+        default=None,
+        description="a lens with options of its own, which are written beside it, instead of an angle or a focal length",
+    )
+
+    @model_validator(mode="before")
+    @classmethod
+    def _with_options(cls, data: Any) -> Any:
+        """Collect the options of the named lens."""
+        if not isinstance(data, Mapping) or cast("Mapping[str, Any]", data).get("projection") is None:
+            return cast(Any, data)
+        given = cast("Mapping[str, Any]", data)
+        if isinstance(given["projection"], LensOptions):
+            cls._check_alone(given["projection"].projection, given)
+            return given
+        kind = _options_of(given["projection"])
+        options = {name: value for name, value in given.items() if name in kind.model_fields or name not in cls.model_fields}
+        rest = {name: value for name, value in given.items() if name not in options}
+        cls._check_alone(given["projection"], rest)
+        shared = [name for name in cls.model_fields if name not in (*cls.LENS, "projection")]
+        try:
+            return {**rest, "projection": kind.model_validate(options)}
+        except ValidationError as error:
+            raise explained(error, (*kind.model_fields, *shared)) from None
+
+    @classmethod
+    def _check_alone(cls, name: str, given: Mapping[str, Any]) -> None:
+        beside = [field for field in cls.LENS if given.get(field) is not None]
+        if beside:
+            with error_at(beside[0]):
+                raise ValueError(
+                    f"expected none beside projection: {name}, whose own options describe the lens; found "
+                    f"{shown(given[beside[0]])}: leave {beside[0]} or projection out"
+                )
+
+    @model_serializer(mode="wrap")
+    def _beside_the_name(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        plain: dict[str, Any] = handler(self)
+        options = plain.pop("projection", None)
+        return plain | options if options else plain
+
+    @classmethod
+    def __get_pydantic_json_schema__(cls, schema: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
+        written = super().__get_pydantic_json_schema__(schema, handler)
+        fields = handler.resolve_ref_schema(written).get("properties", {})
+        for name, kind in _projections().items():
+            if plugins.is_third_party("lenses", name):
+                continue
+            own = kind.model_json_schema()
+            assert "$defs" not in own, f"options of {name}: expected plain types"
+            for option, value in own["properties"].items():
+                if option != "projection":
+                    fields.setdefault(option, {**value, "description": f"projection {name}: {value.get('description', '')}"})
+        return written
