@@ -27,9 +27,18 @@ class Moment(Frozen):
 
 
 class Viewpoint(OmitNone):
-    """The place of a camera on a sphere around `target` (world metres; None: the box centre of object 1), and its time.
+    """The place of a camera on a sphere around its target, and its time.
 
-    `fill` is the share of the picture that a model fills, if the distance follows from it; see `composing.filling`.
+    Attributes:
+        index: Number of the pose.
+        azimuth_deg: Azimuth in degrees.
+        elevation_deg: Elevation in degrees.
+        distance: Distance from the target in metres.
+        tilt_deg: Roll in degrees; positive is clockwise, seen from behind the camera.
+        target: Point in world metres; None: the box centre of object 1.
+        category: Name of the side that the camera sees: front, front-left, ..., top.
+        time: Moment of an animation; None if nothing is animated.
+        fill: Share of the picture that a model fills, if the distance follows from it; see `composing.filling`.
     """
 
     OMIT_IF_NONE = ("fill",)

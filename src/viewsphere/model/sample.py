@@ -35,7 +35,11 @@ Box = tuple[float, float, float, float]
 class ObjectView:
     """The camera as one object sees it: its orbit around the object's box centre, in the object's own axes.
 
-    The tilt is that of the camera after the shortest turn towards that point.
+    Attributes:
+        azimuth_deg: Azimuth in degrees; 0 looks the object in the face.
+        elevation_deg: Elevation in degrees.
+        distance: Distance from the box centre in metres.
+        tilt_deg: Roll in degrees after the shortest turn of the camera towards the box centre; positive is clockwise.
     """
 
     azimuth_deg: float
@@ -46,7 +50,13 @@ class ObjectView:
 
 @dataclass(frozen=True)
 class Rle:
-    """COCO's compressed run-length code of a mask."""
+    """COCO's compressed run-length code of a mask.
+
+    Attributes:
+        height: Height of the mask in pixels.
+        width: Width of the mask in pixels.
+        counts: The compressed run lengths, column by column, as pycocotools reads them.
+    """
 
     height: int
     width: int
@@ -57,27 +67,48 @@ class Rle:
 class ObjectAnnotation:
     """One placed object in one frame, seen or not.
 
-    Its 6D pose in the camera is `camera_from_object`, (4, 4): `p_camera = R @ p_object + t`, metres, camera axes x right,
-    y down, z forward (OpenCV).
+    Its 6D pose in the camera is `camera_from_object`: `p_camera = R @ p_object + t`, metres, camera axes x right, y down, z
+    forward (OpenCV). Boxes are half-open pixel corners (x0, y0, x1, y1). The 3D box is tight and object-aligned; the order
+    of its vertices and faces is that of `viewsphere.geometry.box3d`.
 
-    Boxes are half-open pixel corners (x0, y0, x1, y1). `box2d` is tight around the visible pixels, None if
-    there are none; `box2d_projected` is the box of the projected model clipped to the image, None where
-    they do not meet; `box2d_unclipped` is the same box unclipped, None where the model reaches behind the
-    camera (or out of a distorted lens' field of view). The 3D box is tight and object-aligned: (8, 3) in the object's, the
-    world's and the camera's axes (metres) and (8, 2) in pixels, NaN where the lens does not show the
-    vertex, as behind the camera; vertex order and faces as in `viewsphere.geometry.box3d`. `visibility` is
-    visible pixels over all the pixels the object alone would cover, those outside the image included (BOP's
-    visib_fract, on a canvas of three times the image's width and height); `truncation` is the share of all
-    these pixels that lies outside the image.
+    An imported object has a `source`; values that it lacks are NaN, and key and model may be empty. If it lacks a mask, the
+    mask is empty, but `box2d` and `area` are the annotation's.
 
-    For an animated model, `key` and all facts about the model are those of the frame's moment, and `track` is the key of the
-    animated model, which is equal at all moments; otherwise `track` is empty.
+    Fields of requested labels, of labels from other packages, and of labels that can be derived from any data set are
+    attributes, too.
 
-    An imported object has `source`, its annotation in the imported data set; values that the annotation lacks are NaN, and
-    key and model may be empty. If it lacks a mask, the mask is empty, but `box2d` and `area` are the annotation's.
-
-    `extra` holds the fields of requested labels, and of labels from other packages; these fields are attributes, too. So are
-    the fields of labels that can be derived from any data set, requested or not.
+    Attributes:
+        id: Number of the object in the sequence, from 1; also its track id.
+        category: Name of the category.
+        supercategory: Name of the supercategory.
+        category_id: Number of the category, from 1.
+        key: The model's key in the data set; for an animated model, that of the frame's moment.
+        model: Path of the normalised model, relative to the data set's root.
+        rle: The visible pixels, as a run-length code; see `mask`.
+        area: Number of visible pixels.
+        box2d: The box of the visible pixels; None if there are none.
+        box2d_projected: The box of the projected model, clipped to the image; None if they do not meet.
+        box2d_unclipped: The same box unclipped. None if the model reaches behind the camera, or out of a distorted lens'
+            field of view.
+        box3d_object: (8, 3) float64, vertices of the 3D box in the object's axes, metres.
+        box3d: (8, 3) float64, the vertices in the world, metres.
+        box3d_camera: (8, 3) float64, the vertices in the camera's axes, metres.
+        box3d_pixels: (8, 2) float64, the projected vertices in pixels; NaN where the lens does not show one, as behind the
+            camera.
+        box3d_in_front: (8,) bool, whether each vertex is in front of the camera.
+        world_from_object: (4, 4) float64, the object's pose in the world, metres.
+        camera_from_object: (4, 4) float64, the object's pose in the camera's axes, metres.
+        quaternion: Rotation of `camera_from_object`, (w, x, y, z) with w >= 0.
+        view: The camera as the object sees it.
+        pose_category: Name of the side that the camera sees, such as front-left.
+        size: Width, height and length of the 3D box (the object's x, z and y), metres.
+        real_size: Width, height and length of the real object, metres; None if unknown.
+        visibility: Visible pixels over all pixels that the object alone would cover, those outside the image included. This
+            is BOP's `visib_fract`, on a canvas of three times the image's width and height.
+        truncation: The share of all these pixels that is outside the image.
+        source: The annotation in the imported data set; None if rendered.
+        track: Key of the animated model, equal at all moments; empty for other models.
+        extra: Fields of requested labels, and of labels from other packages.
     """
 
     id: int
@@ -135,7 +166,11 @@ class ObjectAnnotation:
 
     @property
     def mask(self) -> NDArray[np.bool_]:
-        """Visible pixels, (H, W) bool. Raises UserError for invalid run lengths, which an imported data set may contain."""
+        """Visible pixels, (H, W) bool.
+
+        Raises:
+            StoreError: The run lengths are invalid, as an imported data set's may be.
+        """
         from viewsphere.codecs.size import check_size
         from viewsphere.geometry.mask import decode_rle
 
@@ -147,9 +182,7 @@ class ObjectAnnotation:
 
     @property
     def polygons(self) -> list[list[float]]:
-        """COCO polygons of the mask, traced along pixel corners: pycocotools rasterises them to the
-        identical mask.
-        """
+        """COCO polygons of the mask, traced along pixel corners: pycocotools rasterises them to the identical mask."""
         from viewsphere.geometry.mask import mask_polygons
 
         return mask_polygons(self.mask)
@@ -170,8 +203,30 @@ class Origin:
 
 @dataclass(frozen=True, eq=False)
 class Sample(Shown):
-    """One sensor's picture at one instant: camera, pose, objects and channels. `channels` maps names to arrays, loaded on
-    access. Imported pictures may have no known camera and pose; these have an `image_size`.
+    """One sensor's picture at one instant: camera, pose, objects and channels.
+
+    Channels and fields of labels are attributes: `sample.rgb`, `sample.depth`, `sample.captions`. Imported pictures may have
+    no known camera and pose; these have an `image_size`.
+
+    Attributes:
+        index: Number of the frame in the data set, from 0.
+        split: Name of the split.
+        known_camera: The camera; None if unknown. `camera` raises an error instead.
+        known_pose: The camera's viewpoint; None if unknown. `pose` raises an error instead.
+        objects: The annotations of the objects, in the order of their ids.
+        channels: Arrays by names of channels, loaded on access.
+        files: Paths of the channels' files, relative to the data set's root; empty in memory.
+        image_size: Width and height in pixels, if the camera is not known.
+        source: The imported data set's entry of the picture; None if rendered.
+        sequence: Name of the sequence; empty for still pictures.
+        variation: Name of the variation, if the recipe has variations.
+        sensor: Name of the sensor.
+        instant: Number of the instant, from 0 in the sequence or, for still pictures, in the data set.
+        time: Seconds from the sequence's first instant.
+        origin: The shot that the picture belongs to; None if unknown.
+        requested: Names of the labels of objects and of pictures that the recipe requests.
+        extra: Fields of the labels of pictures.
+        options: Options of labels, by their names.
     """
 
     index: int
@@ -201,14 +256,22 @@ class Sample(Shown):
 
     @property
     def camera(self) -> Camera:
-        """The camera; raises StoreError for an imported picture without a known camera."""
+        """The camera.
+
+        Raises:
+            StoreError: The picture is imported and its camera is not known.
+        """
         if self.known_camera is None:
             raise StoreError(f"frame {self.index}: an imported picture has no camera")
         return self.known_camera
 
     @property
     def pose(self) -> Viewpoint:
-        """The camera's viewpoint; raises StoreError for an imported picture without a known pose."""
+        """The camera's viewpoint.
+
+        Raises:
+            StoreError: The picture is imported and its pose is not known.
+        """
         if self.known_pose is None:
             raise StoreError(f"frame {self.index}: an imported picture has no pose")
         return self.known_pose
@@ -225,9 +288,10 @@ class Sample(Shown):
 
     @property
     def picture(self) -> NDArray[np.uint8]:
-        """The colours, (H, W, 3), or (H, W, 4) if only the picture without its background is stored.
+        """The colours, (H, W, 3) uint8 sRGB, or (H, W, 4) if only the picture without its background is stored.
 
-        Raises AttributeError if neither picture is stored.
+        Raises:
+            AttributeError: Neither picture is stored.
         """
         return getattr(self, picture_of(self.channels) or "rgb")
 
@@ -237,13 +301,19 @@ class Sample(Shown):
         return self.files.get(picture_of(self.files) or "")
 
     def point_cloud(self, axes: Axes = "camera", surface: Surface = "visible") -> PointCloud:
-        """Return the picture's visible points, or the points of `surface_samples`, in the axes of the camera or the world.
+        """Return the picture's visible points, or the points of `surface_samples`. Any lens is supported.
 
-        The cloud has colours, objects, categories and normals if their channels are stored. Any lens is supported.
+        Args:
+            axes: `camera` or `world`, the axes of points and normals.
+            surface: `visible`: a point for each pixel that shows a surface, row by row, by `depth_ray`, else by `depth`.
+                `complete`: the points of `surface_samples` on all objects, visible or not, without colours.
 
-        surface `visible`: a point for each pixel that shows a surface, row by row, by `depth_ray`, else by `depth`. surface
-        `complete`: the points of `surface_samples` on all objects, visible or not, without colours. Raises StoreError where
-        these are not kept, or the camera is not known; UserError for other axes or surfaces.
+        Returns:
+            Points (N, 3) float64 in metres; colours, normals, objects and categories if their channels are stored.
+
+        Raises:
+            StoreError: The channels are not stored, or the camera is not known.
+            UserError: `axes` or `surface` has another value.
         """
         from viewsphere.model.annotations.point_cloud import PointCloud
 
@@ -251,8 +321,10 @@ class Sample(Shown):
 
     @property
     def voxel_grid(self) -> VoxelGrid:
-        """The cells of the channel `voxels` as arrays. Raises StoreError if it is not stored, or has another grid than the
-        recipe's.
+        """The cells of the channel `voxels` as arrays.
+
+        Raises:
+            StoreError: The channel is not stored, or has another grid than the recipe's.
         """
         from viewsphere.model.annotations.voxels import Grid, VoxelGrid, Voxels
 

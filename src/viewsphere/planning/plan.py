@@ -82,7 +82,13 @@ SHOT_FRAMES = 16
 
 @dataclass(frozen=True, eq=False)
 class Plan(Shown, SamplingContext):
-    """The frames to render: the poses of every subject, in order. Its memory does not grow with the number of frames."""
+    """The frames to render: the poses of every subject, in order. Its memory does not grow with the number of frames.
+
+    Attributes:
+        categories: The categories of the models, in the order of their ids.
+        shot_frames: Most frames of a shot, the unit of rendering and resuming.
+        credits: The known credits, by the keys of models that the data set keeps.
+    """
 
     categories: tuple[Category, ...] = ()
     shot_frames: int = SHOT_FRAMES
@@ -200,7 +206,15 @@ class Plan(Shown, SamplingContext):
         return (*unlicensed((spec.key for spec in self.kept_specs), self.credits), *options)
 
     def split(self, subject: str, pose: int) -> str:
-        """The split of a frame."""
+        """The split of a frame.
+
+        Args:
+            subject: The subject, one of `taken`.
+            pose: The number of the pose, counted from 0.
+
+        Returns:
+            The name of the split.
+        """
         return self.sampler.split(self, self.world(subject), pose)
 
     def keeping(self, splits: Mapping[str, str], poses: Sequence[int] = ()) -> Plan:
@@ -265,12 +279,20 @@ class Plan(Shown, SamplingContext):
         return len(self.rows)
 
     def shot(self, row: Row | int, box_of: BoxOf, redraws: Sequence[int] = (), redraw: int = 0) -> Shot:
-        """The shot of a row, given as itself or by its number, in the first draw of its scene, from `redraw` on, with room for
-        all objects; raises IndexError past the end.
+        """The shot of a row, with room for all its objects.
 
-        `redraws`: the number of redraws of each pose's random values (its viewpoint, its own company); empty: no redraws.
-        `box_of` gives the boxes of things on the floor and of the cameras' targets. Raises RecipeError if there is not enough
-        room, and the errors of `box_of`.
+        Args:
+            row: A row of `rows`, or its number, counted from 0.
+            box_of: A function that returns the box of a model, for things on the floor and targets of cameras.
+            redraws: The number of redraws of each pose's random values (its viewpoint, its own company); empty: no redraws.
+            redraw: The first draw of the scene to try.
+
+        Returns:
+            The shot in the first draw of its scene, from `redraw` on, that has enough room.
+
+        Raises:
+            IndexError: There is no row of this number.
+            RecipeError: No draw has enough room. Errors of `box_of` pass through.
         """
         row = self.rows[row] if isinstance(row, int) else row
         return self.take(row.subject, tuple(numbers(row.positions)), box_of, row.key, row.first, redraws, redraw)
@@ -368,7 +390,17 @@ class Plan(Shown, SamplingContext):
         return self.sampler.cast(self, self.world(subject), pose)
 
     def shots(self, box_of: BoxOf) -> Iterator[Shot]:
-        """Yield all shots in order, made one by one."""
+        """Yield all shots in order, made one by one.
+
+        Args:
+            box_of: A function that returns the box of a model, as for `shot`.
+
+        Returns:
+            An iterator over the shots.
+
+        Raises:
+            RecipeError: A shot has not enough room. Errors of `box_of` pass through.
+        """
         return (self.shot(row, box_of) for row in self.rows)
 
     @cached_property
@@ -406,10 +438,17 @@ def _unlit(scene: SceneEntry) -> Iterator[str]:
 
 
 def plan(recipe: Recipe | str | PathLike[str], shot_frames: int | None = None) -> Plan:
-    """Return the plan of a recipe (or of the recipe in this file), frame by frame, without reading a mesh.
+    """Return the plan of a recipe, frame by frame, without reading a mesh.
 
-    `shot_frames`: most frames of a shot, for recipes without their own setting.
-    Raises RecipeError for missing files, unknown engines and formats, more frames than `max_frames`.
+    Args:
+        recipe: The recipe, or the path or URL of its file.
+        shot_frames: Most frames of a shot, for recipes without their own setting.
+
+    Returns:
+        The number, order, splits and units of work of all frames. Its memory does not grow with their number.
+
+    Raises:
+        RecipeError: A field is invalid, a file is missing, an engine or format is unknown, or the plan exceeds `max_frames`.
     """
     recipe = Recipe.of(recipe)
     with recipe.located():

@@ -322,7 +322,14 @@ class Recipe(Shown, Frozen):
             raise RecipeError("\n".join(map(self._marks.located, str(error).splitlines()))) from None
 
     def locate(self, message: str) -> str:
-        """The message with the recipe's file and line before it, if it begins with a field's name."""
+        """The message with the recipe's file and line before it, if it begins with a field's name.
+
+        Args:
+            message: An error message, such as "scene.sun: ...".
+
+        Returns:
+            The message, located if possible.
+        """
         return self._marks.located(message)
 
     @property
@@ -332,10 +339,20 @@ class Recipe(Shown, Frozen):
 
     @classmethod
     def load(cls, path: str | PathLike[str], changes: Mapping[str, Any] | None = None) -> Self:
-        """Read a recipe file and those it extends; `changes` are fields to set: `{"viewpoints.elevation": [10, 20]}`.
+        """Read a recipe file and those it extends.
 
-        A recipe at a URL (`s3://bucket/cars/recipe.yaml`) is copied here with its folder. Raises RecipeError with file, line
-        and field of every error, RemoteError if a URL does not answer.
+        A recipe at a URL (`s3://bucket/cars/recipe.yaml`) is copied here with its folder.
+
+        Args:
+            path: Path or URL of the recipe file.
+            changes: Fields to set, by their paths, such as `{"viewpoints.elevation": [10, 20]}`.
+
+        Returns:
+            The validated recipe.
+
+        Raises:
+            RecipeError: A field is invalid; the message has file, line and field of every error.
+            RemoteError: A URL does not answer.
         """
         from viewsphere.recipe.reading.extends import assemble
         from viewsphere.recipe.reading.fetched import fetched
@@ -346,7 +363,18 @@ class Recipe(Shown, Frozen):
 
     @classmethod
     def of(cls, recipe: Recipe | str | PathLike[str]) -> Recipe:
-        """The recipe itself, or the recipe in a file; raises RecipeError as `load` does, and for anything else."""
+        """The recipe itself, or the recipe in a file.
+
+        Args:
+            recipe: A recipe, or the path or URL of its file.
+
+        Returns:
+            The recipe.
+
+        Raises:
+            RecipeError: The file is invalid, as for `load`, or the argument is neither a recipe nor a path.
+            RemoteError: A URL does not answer.
+        """
         if isinstance(recipe, Recipe):
             return recipe
         if not isinstance(recipe, (str, PathLike)):
@@ -354,7 +382,14 @@ class Recipe(Shown, Frozen):
         return cls.load(recipe)
 
     def redrawn(self, seed: int) -> Self:
-        """The recipe with another seed for all random choices, except its models and its splits."""
+        """The recipe with another seed for all random choices, except its models and its splits.
+
+        Args:
+            seed: The other seed.
+
+        Returns:
+            The new recipe.
+        """
         again = self.model_copy(update={"seed": seed})
         again._lasting_seed = self.lasting_seed
         return again
@@ -401,7 +436,11 @@ class Recipe(Shown, Frozen):
         return hashlib.sha256(text.encode()).hexdigest()
 
     def to_yaml(self) -> str:
-        """The recipe as the text of a file, without fields that equal their defaults; paths are kept as they were written."""
+        """The recipe as the text of a file, without fields that equal their defaults.
+
+        Returns:
+            YAML; paths are kept as they were written.
+        """
         from viewsphere.recipe.reading.file import dump
 
         plain = self.model_dump(mode="json", exclude_defaults=True)

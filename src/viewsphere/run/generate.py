@@ -36,8 +36,11 @@ from viewsphere.store.shots.heartbeat import HeartbeatWriter
 
 @dataclass(frozen=True)
 class Warnings:
-    """The warnings of a run, as lines: `models` by models' keys, and `files` by file names, for files that contain several
-    models.
+    """The warnings of a run, as lines.
+
+    Attributes:
+        models: Lines by models' keys.
+        files: Lines by file names, for files that contain several models.
     """
 
     models: dict[str, tuple[str, ...]] = field(default_factory=dict[str, tuple[str, ...]])
@@ -46,8 +49,18 @@ class Warnings:
 
 @dataclass(frozen=True)
 class Summary:
-    """The result of a run: frames in the data set, frames it rendered itself, frames it skipped, seconds, written formats,
-    notes, warnings, and how many frames are left to other shards.
+    """The result of `viewsphere.generate`.
+
+    Attributes:
+        root: Folder of the data set.
+        frames: Number of frames in the data set.
+        rendered: Number of frames that this run rendered.
+        skipped: Models and shots that `keep_going` left out, each with the reason.
+        seconds: Duration of the run.
+        formats: Names of the formats in the data set; empty if frames are missing.
+        notes: Lines for the user.
+        warnings: Warnings about models and files.
+        missing: Number of frames left to other shards.
     """
 
     root: Path
@@ -73,24 +86,34 @@ def generate(
     ray: str | None = None,
     listener: Listener | None = None,
 ) -> Summary:
-    """Render all frames of a recipe (or recipe file) that `out` lacks, then write the formats (default: the recipe's). A
-    format is its name, or {name: {option: value}}; missing options come from the recipe.
+    """Render all frames of a recipe that `out` lacks, then write the formats.
 
-    With `append`, `out` is a finished data set, to which the recipe's additional models, poses and channels are added;
-    existing frames do not change.
+    Finished frames stay if a run stops, and the same call resumes from there. An unusable model is an error before rendering
+    starts.
 
-    `shard` (k, n) renders the k-th of n fixed shares of the shots, counted from 0: runs of all shards, on any machines that see
-    `out`, in any order, several at once, together render everything. The run after which nothing is missing writes the
-    formats; others write none.
+    Args:
+        recipe: The recipe, or the path or URL of its file.
+        out: Folder or URL of the data set.
+        workers: Number of processes that render. 0 renders in the calling process; more need a `__main__` guard in the
+            calling script. None starts one per core, but none if one shot or less than three seconds of work is left.
+        formats: Formats to write, each a name or {name: {option: value}}; None: those of the recipe. Missing options come
+            from the recipe.
+        keep_going: Leaves out unusable models and lost shots, and reports them.
+        append: Adds the recipe's additional models, poses and channels to a finished data set. Existing frames do not
+            change.
+        shard: (k, n) renders the k-th of n fixed shares of the shots, counted from 0. Runs of all shards together render
+            everything. They may run on any machines that see `out`, in any order or several at once. The run after which
+            nothing is missing writes the formats.
+        ray: Address of a Ray cluster whose CPUs render instead, such as "auto" (this machine's cluster), "host:6379" or
+            "ray://host:10001". It uses at most `workers` CPUs, or all for 0 or None. All its machines must see `out`.
+        listener: A function that receives a `Progress` whenever the run has advanced.
 
-    `workers` 0 renders in the calling process; more need a `__main__` guard in the calling script. None starts one worker per
-    core, but none if one shot or less than three seconds of work is left. `ray` is the address of a Ray cluster whose CPUs
-    render instead, such as "auto" (this machine's cluster), "host:6379" or "ray://host:10001". It uses at most `workers` CPUs,
-    or all for 0 or None; all machines of the cluster must see `out`.
+    Returns:
+        The counts, notes and warnings of the run.
 
-    An unusable model is an error before rendering starts; `keep_going` leaves it out and reports it. Raises UserError for the
-    user's mistakes. Raises WorkerDied, after all other shots, for shots that were repeatedly lost with their workers;
-    `keep_going` leaves them out. Finished frames stay, and the same call resumes from there.
+    Raises:
+        UserError: The recipe, a model, the folder or an argument cannot be used.
+        WorkerDied: Shots were repeatedly lost with their workers; raised after all other shots.
     """
     begun = time.monotonic()
     own_shard = ALL if shard is None else shard_of(shard)

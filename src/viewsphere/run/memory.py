@@ -31,10 +31,22 @@ from viewsphere.validation.quantity import quantity
 
 
 class Frames(Shown, Iterable[Sample]):
-    """A recipe's frames, rendered on demand: the result of `viewsphere.render`.
+    """A recipe's frames, rendered on demand; returned by `viewsphere.render`.
 
-    Each loop over the frames renders `epochs` epochs; the next loop continues with the following epoch. `next` returns frames
-    one by one and turns the object into an iterator, which ends once. PyTorch's DataLoader accepts it as an IterableDataset.
+    Each loop over the frames renders the requested epochs; the next loop continues with the following epoch. `next` returns
+    frames one by one and turns the object into an iterator, which ends once. PyTorch's DataLoader accepts it as an
+    IterableDataset.
+
+    Args:
+        recipe: The recipe.
+        shard: The share to render; None: that of the process's rank, or all.
+        shuffle: Draws an order for each epoch.
+        epochs: Epochs in a loop; None: endless.
+        redraw: Redraws random values in all epochs but the first.
+
+    Attributes:
+        plan: The plan of the recipe.
+        epoch: The epoch with which the next loop begins, counted from 0.
     """
 
     def __init__(self, recipe: Recipe, shard: Shard | None, shuffle: bool, epochs: int | None, redraw: bool) -> None:
@@ -71,8 +83,11 @@ class Frames(Shown, Iterable[Sample]):
         return next(self._taken)
 
     def set_epoch(self, epoch: int) -> None:
-        """Set the epoch with which the next loop begins, counted from 0. Loaders that restart their workers for each epoch need
-        this, like PyTorch's DistributedSampler.
+        """Set the epoch with which the next loop begins. Loaders that restart their workers for each epoch need this, like
+        PyTorch's DistributedSampler.
+
+        Args:
+            epoch: The epoch, counted from 0.
         """
         self.epoch = epoch
 
@@ -121,18 +136,24 @@ def render(
     epochs: int | None = 1,
     redraw: bool = False,
 ) -> Frames:
-    """The frames of a recipe (or recipe file), rendered one after another in the process that loops over them; nothing is
-    written.
+    """The frames of a recipe, rendered one after another in the process that loops over them; nothing is written.
 
-    Each worker of a PyTorch DataLoader renders a share; together they render every frame once per epoch. `shard` (k, n) renders
-    the k-th of n shares, counted from 0. By default this is the share of the process's rank if `torch.distributed` is
-    initialised, else all frames. Workers divide the frames of their rank or shard.
+    Each worker of a PyTorch DataLoader renders a share; together they render every frame once per epoch. Poses are shuffled
+    one by one (all sensors of a pose together), sequences as a whole.
 
-    `shuffle` draws an order for each epoch from the recipe's seed. Poses are shuffled one by one (all sensors of a pose
-    together), sequences as a whole. `epochs` is the number of times that a loop renders all frames, None for endless loops.
-    With `redraw`, all epochs but the first redraw the recipe's random values; models and splits stay.
+    Args:
+        recipe: The recipe, or the path or URL of its file.
+        shard: (k, n) renders the k-th of n shares, counted from 0. By default it is the share of the process's rank if
+            `torch.distributed` is initialised, else all frames. Workers divide the frames of their rank or shard.
+        shuffle: Draws an order for each epoch from the recipe's seed.
+        epochs: The number of times that a loop renders all frames; None: loops are endless.
+        redraw: Redraws the recipe's random values in all epochs but the first. Models and splits stay.
 
-    Raises UserError for the user's mistakes: at once for errors in the recipe, otherwise when they are met.
+    Returns:
+        An iterable of `Sample`, which has a length unless it is endless.
+
+    Raises:
+        UserError: The recipe or an argument is invalid. Errors of models are raised when a loop needs the model.
     """
     if epochs is not None and not (isinstance(epochs, int) and epochs > 0):
         raise UserError(f"epochs: expected a number of 1 or more, or None for endless frames; found {shown(epochs)}")

@@ -9,12 +9,19 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Progress:
-    """The progress of a run: `done` of `total`; `resumed` of them were there before this run.
+    """The progress of a run.
 
-    `under_way` are finished frames of unfinished shots, which do not count as done: a run that is stopped loses them.
-    `nodes` are the machines of a cluster at work, None without a cluster.
     Phases are skies (their pictures are analysed), models, kernels (compiled once on a machine, then cached), frames and
-    exports (counted in frames, too). Phases without work are left out.
+    exports. Phases without work are left out.
+
+    Attributes:
+        phase: Name of the phase.
+        done: Number of finished units of the phase; frames and exports count frames.
+        total: Number of units of the phase.
+        resumed: Number of units that were there before this run.
+        under_way: Number of finished frames in unfinished shots. They do not count as done, and a run that is stopped loses
+            them.
+        nodes: Number of working machines of a cluster; None without a cluster.
     """
 
     phase: str

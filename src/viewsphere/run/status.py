@@ -14,8 +14,13 @@ from viewsphere.store.shots.heartbeat import SILENT_S, Heartbeat
 
 @dataclass(frozen=True)
 class Run:
-    """A run at work: its last report, and the report's age in seconds. Its `state` is running, dead (its process is gone), or
-    silent (on another machine, without a report for SILENT_S seconds, so most likely dead).
+    """A run that has not ended.
+
+    Attributes:
+        told: Its last report.
+        seconds_ago: Age of the report in seconds.
+        state: `running`; `dead`: its process is gone; `silent`: it is on another machine and has not reported for `SILENT_S`
+            seconds, so it is most likely dead.
     """
 
     told: Heartbeat
@@ -25,15 +30,16 @@ class Run:
 
 @dataclass(frozen=True)
 class Status:
-    """The progress of a data set.
+    """The progress of a data set. Frames are counted shot by shot; frames that get a channel later count once more.
 
-    Frames are counted shot by shot: those that are `finished`, `left_out` at the user's request, and `missing`.
-    The missing include those `under_way` (made by a run, in incomplete shots: lost if the run dies).
-    Frames that get a channel later count once more.
-    `models` are keys of models that are still missing. `failed` are the last reports of shards that ended with an error,
-    until they run again.
-    `rate` is the rate of all runs together, frames a second; `seconds_left` is the time for the missing frames at this rate,
-    None while no run makes frames.
+    Attributes:
+        root: Folder of the data set.
+        frames: Number of frames in the plan.
+        finished: Number of frames in finished shots.
+        missing: Number of frames still to make, including those `under_way`.
+        models: Keys of models that are still missing.
+        runs: The runs that have not ended.
+        failed: The last report of each shard that ended with an error, until it runs again.
     """
 
     root: Path
@@ -51,7 +57,7 @@ class Status:
 
     @property
     def under_way(self) -> int:
-        """Missing frames that runs have made, in incomplete shots."""
+        """Missing frames that runs have made, in incomplete shots; a run that dies loses them."""
         return sum(run.told.under_way for run in self.runs if run.state == "running")
 
     @property
@@ -66,20 +72,33 @@ class Status:
 
     @property
     def seconds_left(self) -> float | None:
-        """Seconds until nothing is missing, at this rate."""
+        """Seconds until nothing is missing, at the current rate; None while no run makes frames."""
         return (self.missing - self.under_way) / self.rate if self.rate else None
 
     def to_json(self) -> dict[str, Any]:
-        """Return the status as plain data, for scripts."""
+        """Return the status as plain data, for scripts.
+
+        Returns:
+            All attributes by name, of types that JSON has.
+        """
         told = {**asdict(self), "root": str(self.root), "models": list(self.models)}
         asked = ("left_out", "under_way", "complete", "rate", "seconds_left")
         return told | {name: getattr(self, name) for name in asked}
 
 
 def status(out: Path | str | os.PathLike[str]) -> Status:
-    """Return the status of the data set in a folder; raises StoreError if there is none.
+    """Return the status of a data set. It writes nothing and opens no shot.
 
-    It writes nothing and opens no shot. Its time depends on the number of finished shots, not of planned ones.
+    Its time depends on the number of finished shots, not of planned ones.
+
+    Args:
+        out: Folder or URL of the data set.
+
+    Returns:
+        The counts of frames, the missing models and the active runs.
+
+    Raises:
+        StoreError: There is no data set.
     """
     store = Store(located(out))
     plan = store.plan()

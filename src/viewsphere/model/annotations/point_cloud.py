@@ -25,9 +25,16 @@ VISIBLE = 0
 
 @dataclass(frozen=True, eq=False)
 class PointCloud:
-    """points (N, 3) float64, metres, in the axes that `axes` names; colors (N, 3) uint8 sRGB, normals (N, 3) float32 in the
-    same axes, towards the camera, instances (N,) int32, 0 for none, categories (N,) int32 likewise: None where the sample lacks
-    the channels that they come from. visible (N,) bool: whether the camera sees them.
+    """Points of surfaces. Optional arrays are None if the sample lacks the channels that they come from.
+
+    Attributes:
+        axes: `camera` or `world`, the axes of points and normals.
+        points: (N, 3) float64, metres.
+        visible: (N,) bool, whether the camera sees the point.
+        colors: (N, 3) uint8 sRGB.
+        normals: (N, 3) float32, unit length, towards the camera.
+        instances: (N,) int32, id of the object; 0 for none.
+        categories: (N,) int32, number of the category; 0 for none.
     """
 
     axes: Axes

@@ -122,9 +122,13 @@ def _heading(camera: Camera) -> tuple[float, float]:
 
 @dataclass(frozen=True, eq=False)
 class Occupancy:
-    """The cells of a cube around a model, `filled` (n, n, n) uint8 along the object's x, y and z: 0 nothing, 1 a triangle
-    crosses the cell, 2 its centre is inside the model. `cell`: side of a cell, metres; `corner` (3,): corner of the first cell,
-    object axes.
+    """The cells of a cube around a model.
+
+    Attributes:
+        filled: (n, n, n) uint8 along the object's x, y and z: 0 nothing, 1 a triangle crosses the cell, 2 its centre is
+            inside the model.
+        cell: Side of a cell, metres.
+        corner: (3,) float64, corner of the first cell, object axes, metres.
     """
 
     filled: NDArray[np.uint8]
@@ -147,7 +151,14 @@ class Occupancy:
         return cls(filled, cell, corner)
 
     def centers(self, chosen: NDArray[np.bool_]) -> NDArray[np.float64]:
-        """Centres (N, 3) of the chosen cells in the object's axes, metres."""
+        """Centres of the chosen cells.
+
+        Args:
+            chosen: (n, n, n) bool, such as `filled > 0`.
+
+        Returns:
+            Points (N, 3) float64 in the object's axes, metres.
+        """
         return (np.argwhere(chosen) + 0.5) * self.cell + self.corner
 
 
@@ -155,8 +166,13 @@ class Occupancy:
 class VoxelGrid:
     """The content of each cell of a sample's grid, arrays of shape `grid.size` (ahead, up, right).
 
-    `classes` int32 and `instances` int32 are 0 for none. The codes of `filled`, `state` uint8 and `indoors` bool are those of
-    `RUN`.
+    Attributes:
+        grid: Place and size of the cells.
+        classes: int32, number of the class in a cell; 0 for none.
+        instances: int32, id of the object in a cell; 0 for none.
+        filled: uint8, 0 nothing, 1 a surface, 2 the inside of an object.
+        state: uint8, 0 outside the picture, 1 free, 2 a visible surface, 3 occluded.
+        indoors: bool, whether the cell's centre is between scenery above and scenery or ground below.
     """
 
     grid: Grid
@@ -180,5 +196,12 @@ class VoxelGrid:
         return cls(grid, whole("class"), whole("instance"), whole("filled"), whole("state"), indoors)
 
     def centers(self, chosen: NDArray[np.bool_]) -> NDArray[np.float64]:
-        """Centres (N, 3) of the chosen cells in the world, metres: `centers(grid.classes > 0)`."""
+        """Centres of the chosen cells.
+
+        Args:
+            chosen: Array of shape `grid.size`, bool, such as `classes > 0`.
+
+        Returns:
+            Points (N, 3) float64 in the world, metres.
+        """
         return self.grid.points(np.argwhere(chosen) + 0.5)

@@ -43,7 +43,13 @@ class Intrinsics(Frozen):
 
 @dataclass(frozen=True, eq=False)
 class Camera:
-    """One frame's camera: intrinsics and the world-to-camera motion x_camera = R x_world + t (OpenCV axes, metres)."""
+    """One frame's camera: `x_camera = R @ x_world + t`, metres, camera axes x right, y down, z forward (OpenCV).
+
+    Attributes:
+        intrinsics: Image size, camera matrix and distortion.
+        R: (3, 3) float64, rotation from the world to the camera.
+        t: (3,) float64, metres.
+    """
 
     intrinsics: Intrinsics
     R: NDArray[np.float64]

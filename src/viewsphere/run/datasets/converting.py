@@ -28,8 +28,12 @@ from viewsphere.store.shots.checksums import CHECKSUMS, damaged_files
 
 @dataclass(frozen=True)
 class Converted:
-    """The result of a conversion: the number of written frames, the frames that `keep_going` left out, and notes of the
-    formats.
+    """The result of `viewsphere.convert`.
+
+    Attributes:
+        frames: Number of written frames.
+        left_out: The parts that `keep_going` left out, with reasons.
+        notes: Notes of the formats for the user.
     """
 
     frames: int
@@ -47,14 +51,27 @@ def convert(
     workers: int = 0,
     listener: Listener | None = None,
 ) -> Converted:
-    """Write another tool's data set, of the format `kind`, in these formats, each to OUT/<format>, as `export` does. The files
-    are hard links to the source's files or copies of them, so you can delete the source afterwards.
+    """Write another tool's data set in these formats, each to OUT/<format>, as `export` does.
 
-    Either all folders are written or none. A folder from an earlier run with the same files stays, so a run that was killed
-    between two folders can be repeated.
+    The files are hard links to the source's files or copies of them, so you can delete the source afterwards. Either all
+    folders are written or none. A folder from an earlier run with the same files stays, so you can repeat a run that was
+    killed between two folders.
 
-    Raises UserError for formats that are unknown or cannot hold the data set. Raises StoreError for a broken data set, unless
-    `keep_going` leaves the broken parts out, and for folders that contain other files.
+    Args:
+        kind: Format of the source, such as `coco`.
+        source: Folder or file of the source.
+        formats: Formats to write, as for `export`.
+        out: Folder for the exports.
+        keep_going: Leaves out broken parts of the source, and reports them.
+        workers: Number of processes, as for `export`.
+        listener: A function that receives a `Progress` whenever the work has advanced.
+
+    Returns:
+        The number of frames, what was left out, and notes.
+
+    Raises:
+        UserError: A format is unknown or cannot hold the data set.
+        StoreError: The source is broken, or a folder contains other files.
     """
     entries = read_formats(formats)
     for entry in entries:

@@ -31,14 +31,27 @@ def export(
     workers: int = 0,
     listener: Listener | None = None,
 ) -> tuple[str, ...]:
-    """Write the finished frames of a data set in these formats, each to OUT/<format> or OUTPUT/<format>; returns notes for the
-    user. A format is its name, or {name: {option: value}}. Missing options come from the export in the data set's folder, else
-    from its recipe, else from the format's defaults.
+    """Write the finished frames of a data set in these formats, each to OUT/<format> or OUTPUT/<format>.
 
-    A long export is shared among `workers` processes if there are two or more, which need a `__main__` guard in the calling
-    script. The folders replace older exports only when all are complete; a partial export never replaces an export of all
-    frames. Raises UserError for an unknown format or a selection without output or frames. Raises StoreError if `out` is not a
-    data set or a folder cannot be written, WorkerDied if a process is killed.
+    The folders replace older exports only when all are complete. A partial export never replaces an export of all frames.
+
+    Args:
+        out: Folder or URL of the data set.
+        formats: Names of formats in a text with commas, or a list of names and of {name: {option: value}}. Missing options
+            come from the export in the data set's folder, else from its recipe, else from the format's defaults.
+        output: Folder for the exports; None: that of the data set.
+        choice: The models and frames to export; None: all. A part needs an `output`.
+        workers: Number of processes that share a long export, if there are two or more. They need a `__main__` guard in the
+            calling script.
+        listener: A function that receives a `Progress` whenever the export has advanced.
+
+    Returns:
+        Notes for the user, each once.
+
+    Raises:
+        UserError: A format is unknown or cannot hold the data set, or the choice has no frames or no output.
+        StoreError: `out` is no data set, or a folder cannot be written.
+        WorkerDied: A process was killed.
     """
     dataset = Dataset(out, choice)
     place = dataset.root if output is None else located(output)

@@ -27,11 +27,12 @@ SHOTS = 4
 
 @dataclass(frozen=True, eq=False)
 class Matches:
-    """The positions of each pixel's point in another picture.
+    """The positions of each pixel's point in another picture; returned by `viewsphere.matches`.
 
-    xy (H, W, 2) float64: pixels, NaN where the pixel has none.
-    z (H, W) float64: metres along the other camera's axis, infinite for the sky, NaN where there is no pixel.
-    state (H, W) uint8: 0 visible, 1 occluded, 2 outside, 3 behind, 4 invalid.
+    Attributes:
+        xy: (H, W, 2) float64, pixels (x, y) in the other picture, NaN where the point has no position.
+        z: (H, W) float64, metres along the other camera's optical axis, infinite for the sky, NaN where `xy` is NaN.
+        state: (H, W) uint8, 0 visible, 1 occluded, 2 outside, 3 behind, 4 invalid.
     """
 
     xy: NDArray[np.float64]
@@ -40,9 +41,18 @@ class Matches:
 
 
 def matches(a: Sample, b: Sample) -> Matches:
-    """The matches of each pixel of `a` in `b`: two samples of one sequence, or of still pictures of one subject.
+    """Match each pixel of `a` with its position in `b`, by geometry.
 
-    Raises UserError for other pairs, and StoreError for samples with unknown geometry, such as imported ones.
+    Args:
+        a: A sample of a sequence, or a still picture.
+        b: Another sample of the same sequence, or another still picture of the same subject.
+
+    Returns:
+        Positions, depths and states, each with the size of `a`.
+
+    Raises:
+        UserError: The samples belong to different sequences or subjects.
+        StoreError: The geometry of a sample is unknown, as for imported pictures.
     """
     shots = tuple(map(_shot_of, (a, b)))
     if a.sequence != b.sequence or (not a.sequence and _subject(shots[0]) != _subject(shots[1])):

@@ -12,8 +12,11 @@ from viewsphere.errors import UserError
 
 @dataclass(frozen=True)
 class Choice:
-    """Frames whose model's key matches one of the patterns, and whose number is in one of the ranges [first, stop); without
-    patterns all models, without ranges all numbers.
+    """The chosen frames of a data set: those of chosen models with chosen numbers.
+
+    Attributes:
+        models: Patterns of models' keys, such as `car-*`; empty: all models.
+        frames: Ranges [first, stop) of frames' numbers; empty: all numbers.
     """
 
     models: tuple[str, ...] = ()

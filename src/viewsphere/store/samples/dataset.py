@@ -52,8 +52,21 @@ Options = Mapping[str, Mapping[str, Any]]
 class Dataset(Shown, Sequence[Sample]):
     """The finished frames of a data set, in frame order; returned by `viewsphere.open`.
 
-    `len`, indexing and iteration return samples that read their channels on access. `link` and `path` are for exporters. With a
-    choice, the data set has only the chosen frames.
+    `len`, indexing and iteration return samples, which read their channels on access. `link`, `put` and `path` are for
+    exporters.
+
+    Args:
+        root: Folder or URL of the data set.
+        choice: The models and frames that the data set has; None: all.
+
+    Raises:
+        StoreError: There is no data set, or its plan is broken.
+
+    Attributes:
+        root: Folder of the data set.
+        choice: The chosen models and frames.
+        store: The folder's store of finished shots.
+        plan: The stored plan.
     """
 
     def __init__(self, root: str | os.PathLike[str], choice: Choice | None = None) -> None:
@@ -184,19 +197,37 @@ class Dataset(Shown, Sequence[Sample]):
             yield from self.samples_of(key, places)
 
     def select(self, *fields: str, split: str | None = None, sensor: str | None = None) -> Selection:
-        """Selected fields of the frames of one split or all, and of one sensor or all: a map-style data set for PyTorch's
-        DataLoader. Only the named fields are decoded.
+        """Selected fields of frames: a map-style data set for PyTorch's DataLoader. Only the named fields are decoded.
 
-        `fields`: names of channels (`rgb`), of values of samples (`index`, `split`, `sensor`, `time`, `camera.K`,
-        `pose.azimuth_deg`, `camera_from_next`, ...), and of objects (`objects.box2d`, `objects.category_id`, `objects.mask`,
-        `objects.keypoints`, ...). Fields of objects become arrays (N, ...), float64, int64 or bool, with NaN for missing
-        values. Run-length codes become masks (N, H, W). Values of several shapes, and other types, become lists. `objects.view`
-        is (N, 4): azimuth, elevation (degrees), distance (metres), tilt (degrees). Raises UserError for other fields.
+        Fields of objects become arrays (N, ...), float64, int64 or bool, with NaN for missing values. Run-length codes
+        become masks (N, H, W) bool. Values of several shapes, and other types, become lists. `objects.view` is (N, 4)
+        float64: azimuth, elevation (degrees), distance (metres), tilt (degrees).
+
+        Args:
+            *fields: Names of channels (`rgb`), of values of samples (`index`, `split`, `sensor`, `time`, `camera.K`,
+                `pose.azimuth_deg`, `camera_from_next`, ...), and of objects (`objects.box2d`, `objects.category_id`,
+                `objects.mask`, `objects.keypoints`, ...).
+            split: Name of a split; None: all.
+            sensor: Name of a sensor; None: all.
+
+        Returns:
+            A sequence with a dict of these fields for each frame.
+
+        Raises:
+            UserError: A field, split or sensor is not in the data set.
         """
         return Selection(self, fields, split, sensor)
 
     def of(self, split: str | None = None, sensor: str | None = None) -> Iterator[int]:
-        """Positions in the data set of the frames of a split and a sensor; reads all records."""
+        """Positions in the data set of the frames of a split and a sensor; reads all records.
+
+        Args:
+            split: Name of a split; None: all.
+            sensor: Name of a sensor; None: all.
+
+        Returns:
+            An iterator over positions, counted from 0, in frame order.
+        """
         for (key, places), first in zip(*self._shots, strict=False):
             records = self._read_records(key)
             splits, sensors = records.splits, records.sensors
@@ -207,21 +238,54 @@ class Dataset(Shown, Sequence[Sample]):
             )
 
     def shots(self) -> Iterator[tuple[str, Sequence[int]]]:
-        """Key of every finished shot, in frame order, and the places of its chosen frames, counted from 0."""
+        """Yield every finished shot, in frame order.
+
+        Returns:
+            An iterator over pairs: the shot's key, and the places of its chosen frames, counted from 0.
+        """
         yield from self._shots[0]
 
     def samples_of(self, key: str, places: Sequence[int]) -> Iterator[Sample]:
-        """Some of a finished shot's samples."""
+        """Yield some of a finished shot's samples.
+
+        Args:
+            key: The shot's key.
+            places: Places of samples in the shot, counted from 0.
+
+        Returns:
+            An iterator over the samples, in the order of `places`.
+
+        Raises:
+            StoreError: The shot's files are damaged.
+        """
         records = self._read_records(key)
         for place in places:
             yield self.shown(self._sample(records, place))
 
     def sample_at(self, key: str, place: int) -> Sample:
-        """One of a finished shot's samples, counted from 0; the records of a few shots are cached."""
+        """One of a finished shot's samples; the records of a few shots are cached.
+
+        Args:
+            key: The shot's key.
+            place: Place of the sample in the shot, counted from 0.
+
+        Returns:
+            The sample, which reads its channels on access.
+
+        Raises:
+            StoreError: The shot's files are damaged.
+        """
         return self.shown(self._sample(self._records(key), place))
 
     def shown(self, sample: Sample) -> Sample:
-        """The sample as the data set returns it: unchanged."""
+        """The sample as the data set returns it: unchanged.
+
+        Args:
+            sample: A sample from the store.
+
+        Returns:
+            The same sample; subclasses may leave out annotations.
+        """
         return sample
 
     @property
@@ -241,8 +305,17 @@ class Dataset(Shown, Sequence[Sample]):
         return sequences
 
     def sequence(self, name: str, sensor: str = CAMERA) -> tuple[Sample, ...]:
-        """The samples of one sensor in a sequence, in the order of its instants; raises StoreError for an unknown sequence or
-        sensor.
+        """The samples of one sensor in a sequence, in the order of its instants.
+
+        Args:
+            name: Name of the sequence, one of `sequences`.
+            sensor: Name of the sensor.
+
+        Returns:
+            The finished samples.
+
+        Raises:
+            StoreError: The sequence or the sensor is unknown.
         """
         if name not in self._sequences:
             known = one_of(name, self.sequences) if self.sequences else "expected sequences, found still pictures only"
@@ -255,8 +328,17 @@ class Dataset(Shown, Sequence[Sample]):
         return tuple(samples_of_sensor)
 
     def tracks(self, sequence: str, sensor: str = CAMERA) -> PointTracks:
-        """The points that a sensor followed through a sequence; raises StoreError for an unknown sequence or sensor, or a
-        sensor that follows no points.
+        """The points that a sensor followed through a sequence.
+
+        Args:
+            sequence: Name of the sequence, one of `sequences`.
+            sensor: Name of the sensor.
+
+        Returns:
+            Positions (T, N, 2) in pixels and (T, N, 3) in metres, and states (T, N), of N points at T instants.
+
+        Raises:
+            StoreError: The sequence or the sensor is unknown, or the sensor follows no points.
         """
         samples = self.sequence(sequence, sensor)
         if samples and "tracks" not in samples[0].channels and any(part.recipe.get("tracks") for part in self.plan.parts):
@@ -325,7 +407,17 @@ class Dataset(Shown, Sequence[Sample]):
         return _Records(file, records, ShotRecords(shot, self._facts, str(file), str(self.root)), files)
 
     def labelled(self, key: str) -> Shot | None:
-        """A finished shot as `Store.labelled` gives it; raises StoreError if the number of samples differs from the plan."""
+        """A finished shot as `Store.labelled` gives it.
+
+        Args:
+            key: The shot's key.
+
+        Returns:
+            The shot with its labelled objects; None if the store has no shot of this key.
+
+        Raises:
+            StoreError: The number of samples differs from the plan.
+        """
         shot, row = self.store.labelled(key), self.plan.find(key)
         if shot is not None and row is not None and (count := sum(1 for _ in shot.samples)) != row.count:
             file = self.store.shot_folder(key) / "shot.json"
@@ -398,17 +490,46 @@ class Dataset(Shown, Sequence[Sample]):
             ) from None
 
     def path(self, relative: str) -> Path:
-        """A file of the data set; raises StoreError for a path that leads out of it."""
+        """A file of the data set.
+
+        Args:
+            relative: Path relative to the data set's root.
+
+        Returns:
+            The absolute path.
+
+        Raises:
+            StoreError: The path leads out of the data set.
+        """
         return file_inside(self.root, relative)
 
     def read(self, relative: str) -> bytes:
-        """The bytes of a channel's file, also from a tar. Raises StoreError if they changed since they were written, or for a
-        path that leaves the data set; OSError if the file cannot be read.
+        """The bytes of a channel's file, also from a tar.
+
+        Args:
+            relative: Path relative to the data set's root.
+
+        Returns:
+            The content, proved against its digest.
+
+        Raises:
+            StoreError: The file has changed since it was written, or the path leads out of the data set.
+            OSError: The file cannot be read.
         """
         return _read(self.root, self._manifests, relative)
 
     def stored(self, relative: str) -> Path | Loaded:
-        """A stored file, or its content if it is in its shot's tar. Raises StoreError for a path that leaves the data set."""
+        """A stored file, or its content if it is in its shot's tar.
+
+        Args:
+            relative: Path relative to the data set's root.
+
+        Returns:
+            The absolute path, or the suffix and the bytes of a file in a tar.
+
+        Raises:
+            StoreError: The path leads out of the data set.
+        """
         file = self.path(relative)
         if relative.startswith("store/shots/"):
             folder, inside = _parted(relative)
@@ -417,8 +538,15 @@ class Dataset(Shown, Sequence[Sample]):
         return file
 
     def link(self, relative: str, destination: Path) -> None:
-        """Put a stored file at `destination`: a hard link, else a reflink, else a copy; `link_kinds` records the kind. A file
-        from a shot's tar is always copied. Raises StoreError for a path that leads out of the data set.
+        """Put a stored file at `destination`: a hard link, else a reflink, else a copy; `link_kinds` records the kind. A
+        file from a shot's tar is always copied.
+
+        Args:
+            relative: Path relative to the data set's root.
+            destination: Path of the new file; missing folders are made.
+
+        Raises:
+            StoreError: The path leads out of the data set.
         """
         if not destination.parent.is_dir():
             destination.parent.mkdir(parents=True, exist_ok=True)
@@ -429,16 +557,30 @@ class Dataset(Shown, Sequence[Sample]):
             self.link_kinds.add(link_file(file.resolve() if file.is_symlink() else file, destination))
 
     def put(self, frame: int, name: str, make: Callable[[], bytes], destination: Path) -> None:
-        """Write the result of `make` to `destination`. If another export of this pass wrote the same encoding of the frame, by
-        its name, that file is linked.
+        """Write the result of `make` to `destination`. If another export of this pass wrote the same encoding of the frame,
+        by its name, that file is linked.
+
+        Args:
+            frame: Number of the frame.
+            name: Name of the encoding.
+            make: A function that returns the content.
+            destination: Path of the new file.
         """
         kind = self.made.put(frame, name, make, destination)
         if kind:
             self.link_kinds.add(kind)
 
     def mesh(self, key: str) -> Mesh:
-        """A finished model, or a time step of one, with its materials, in object axes, as in its GLB. Raises StoreError if it
-        is absent.
+        """A finished model, or a time step of one, with its materials, as in its GLB.
+
+        Args:
+            key: The key of the model or time step, as in `ObjectAnnotation.key`.
+
+        Returns:
+            Vertices in metres and object axes, triangles and materials.
+
+        Raises:
+            StoreError: The data set has no such model.
         """
         from viewsphere.assets.exporting.exported import read_exported
 
@@ -452,9 +594,20 @@ class Dataset(Shown, Sequence[Sample]):
             return read_exported(file, info.parts, info.node, whole=True)
 
     def occupancy(self, key: str, cells: int = 32) -> Occupancy:
-        """Return the occupied cells of a model, in a cube around it with this many cells along each side.
-        A cell is occupied where the model's surface is, and inside its closed pieces.
-        Raises StoreError as `mesh` does, ValueError for too many cells.
+        """Return the occupied cells of a model, in a cube around it. A cell is occupied where the model's surface is, and
+        inside its closed pieces.
+
+        Args:
+            key: The key of the model or time step.
+            cells: Number of cells along each side of the cube.
+
+        Returns:
+            The cells (`cells`, `cells`, `cells`) uint8 along the object's axes, their side in metres, and the corner of the
+                first.
+
+        Raises:
+            StoreError: The data set has no such model.
+            ValueError: There are too many cells.
         """
         from viewsphere.model.annotations.voxels import Occupancy
 
@@ -462,8 +615,10 @@ class Dataset(Shown, Sequence[Sample]):
         return Occupancy.of(mesh.vertices, mesh.triangles, cells)
 
     def model_files(self) -> Iterator[tuple[str, str]]:
-        """Every finished model's OBJ, GLB, materials and textures: `<key>/<name>`, and the path from the data set's root. A
-        model that deforms comes with all its time steps.
+        """Yield every finished model's OBJ, GLB, materials and textures. A model that deforms comes with all its time steps.
+
+        Returns:
+            An iterator over pairs: `<key>/<name>`, and the path relative to the data set's root.
         """
         for key, folder in {info.track or info.key: self.path(info.obj).parent for info in self.models}.items():
             for file in files_inside(self.root, folder):
@@ -471,7 +626,11 @@ class Dataset(Shown, Sequence[Sample]):
                     yield f"{key}/{file.name}", file.relative_to(self.root).as_posix()
 
     def link_models(self, folder: Path) -> None:
-        """Link the files of every finished model into `folder`/<key>; see `link`."""
+        """Link the files of every finished model into `folder`/<key>; see `link`.
+
+        Args:
+            folder: Folder for the models.
+        """
         for inside, stored in self.model_files():
             self.link(stored, folder / inside)
 

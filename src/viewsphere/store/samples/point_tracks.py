@@ -19,13 +19,16 @@ Float = NDArray[np.float64]
 class PointTracks:
     """N points that one sensor followed through the T finished instants of a sequence.
 
-    ids (N,) int64: their numbers, in the order of the queries; query (N, 3) float64: the instant, and the position (x, y) in
-    pixels, at which each was picked; object (N,) int32: id of the object at the point, 0 for none.
-
-    At each instant: xy (T, N, 2) float64 pixels, NaN for points without a position; xyz (T, N, 3) float64 metres in the
-    camera's axes, world (T, N, 3) in the world's, NaN where it is nowhere: points of the sky have xyz (NaN, NaN, inf) and world
-    NaN; state (T, N) uint8: 0 visible, 1 occluded, 2 outside, 3 behind, 4 invalid. instants (T,) int64 are the instants'
-    numbers.
+    Attributes:
+        ids: (N,) int64, numbers of the points, in the order of the queries.
+        query: (N, 3) float64, the instant and the pixel (x, y) at which each point was picked.
+        object: (N,) int32, id of the object at the point; 0 for none.
+        xy: (T, N, 2) float64, pixels; NaN for points without a position.
+        xyz: (T, N, 3) float64, metres in the camera's axes; (NaN, NaN, inf) for points of the sky, else NaN without a
+            position.
+        world: (T, N, 3) float64, metres in the world; NaN for points of the sky and without a position.
+        state: (T, N) uint8, 0 visible, 1 occluded, 2 outside, 3 behind, 4 invalid.
+        instants: (T,) int64, numbers of the instants.
     """
 
     ids: NDArray[np.int64]

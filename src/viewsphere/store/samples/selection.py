@@ -27,8 +27,17 @@ OF_POSE = ("pose.azimuth_deg", "pose.elevation_deg", "pose.distance", "pose.tilt
 class Selection(Sequence[dict[str, Any]]):
     """Some fields of some frames: item i is a dict of the fields of the i-th frame; returned by `Dataset.select`.
 
-    A map-style data set for PyTorch's DataLoader, which needs no PyTorch itself: it has a length and random access, its memory
-    does not grow, and workers receive it as the data set's path.
+    A map-style data set for PyTorch's DataLoader, which needs no PyTorch itself: it has a length and random access. Its
+    memory does not grow, and workers receive it as the data set's path.
+
+    Args:
+        dataset: The data set.
+        fields: Names of fields; see `Dataset.select`.
+        split: Name of a split; None: all.
+        sensor: Name of a sensor; None: all.
+
+    Raises:
+        UserError: A field, split or sensor is not in the data set.
     """
 
     def __init__(self, dataset: Dataset, fields: Sequence[str], split: str | None = None, sensor: str | None = None) -> None:

@@ -66,7 +66,13 @@ class OtherStoreError(Exception):
 
 @dataclass(frozen=True)
 class Category:
-    """A category of the data set; ids count from 1 in order of appearance in the recipe."""
+    """A category of the data set.
+
+    Attributes:
+        id: Number from 1, in order of appearance in the recipe.
+        name: Name of the category.
+        supercategory: Name of the supercategory.
+    """
 
     __pydantic_config__ = _STRICTLY
 
@@ -79,12 +85,34 @@ class Category:
 class ModelInfo:
     """A normalised model of the data set; paths are relative to its root.
 
-    `box3d_object` (8, 3) metres in the object's axes; sizes are (width, height, length) in metres; `diameter` is the largest
-    distance between two vertices, metres, None in records of older versions; `symmetries` and `keypoints` come from the model
-    file, or are measured (`ModelMetadata`); `looks` is its appearance, None if no label needs it. A model that deforms has a
-    record for each of its `steps`, ascending, whose `track` is its key; its own fields describe its file's first frame.
+    A model that deforms has a record for each of its `steps`; its own fields describe its file's first frame.
 
-    `parts`, `materials` and `body_parts` name the numbers 1, 2, ... in the maps of these names.
+    Attributes:
+        key: Key of the model, or of its time step.
+        category: Name of the category.
+        supercategory: Name of the supercategory.
+        category_id: Number of the category, from 1.
+        obj: Path of the OBJ file.
+        glb: Path of the GLB file.
+        box3d_object: (8, 3) float64, vertices of the 3D box in the object's axes, metres.
+        size: Width, height and length of the box, metres.
+        real_size: Width, height and length of the real object, metres; None if unknown.
+        parts: Names of the numbers 1, 2, ... in part maps.
+        triangles: Number of triangles.
+        digest: SHA-256 of the model.
+        warnings: Repairs and omissions of the file's reader.
+        step: The time step that the files show; None: not animated.
+        track: Key of the animated model, in records of its time steps; else empty.
+        steps: Records of the time steps, ascending.
+        credit: Author, licence and source; None if unknown.
+        materials: Names of the numbers 1, 2, ... in material maps.
+        diameter: Largest distance between two vertices, metres; None in records of older versions.
+        symmetries: Symmetries from the model file or measured; None if unknown.
+        keypoints: Keypoints from the model file or measured; None if unknown.
+        body_parts: Names of the numbers 1, 2, ... in body part maps.
+        looks: The appearance; None if no label needs it.
+        faces: `as_file`: single-sided materials are visible from the front only; None: all from both sides.
+        optional: Further data, which a reader may ignore.
     """
 
     __pydantic_config__ = _STRICTLY
@@ -121,8 +149,16 @@ class ModelInfo:
         return None if self.step is None else PurePosixPath(self.obj).stem
 
     def at_frame(self, frame: int | None) -> ModelInfo:
-        """Return the metadata at a time step, by the frame of the model's file (None: at rest); raises ValueError for another
-        frame.
+        """Return the metadata at a time step.
+
+        Args:
+            frame: Frame of the model's file; None: at rest.
+
+        Returns:
+            The record of the time step.
+
+        Raises:
+            ValueError: The model has no such time step.
         """
         step_info = (
             self if frame is None else next((step for step in self.steps if step.step and step.step.frame == frame), None)
