@@ -43,7 +43,7 @@ from viewsphere.model.channel import PASSES, PICTURES
 from viewsphere.plugins.engine import EngineSpec
 from viewsphere.plugins.format import FormatSpec
 from viewsphere.plugins.material import MaterialSpec
-from viewsphere.recipe.reading.file import schema
+from viewsphere.recipe.recipe import schema
 from viewsphere.run.reports.format_list import Listed, listed
 from viewsphere.run.reports.plugin_list import SPECS
 

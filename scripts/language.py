@@ -98,7 +98,7 @@ def guides() -> Iterator[Text]:
 
 def reference() -> Iterator[Text]:
     """CHANGELOG, the help of the command line, and the descriptions of a recipe's fields."""
-    from viewsphere.recipe.reading.file import schema
+    from viewsphere.recipe.recipe import schema
 
     yield markdown("CHANGELOG.md", (ROOT / "CHANGELOG.md").read_text("utf-8"))
     yield markdown("docs/cli.md", re.sub(r"\| (`[^|]*?) \| (.*) \|", r"\n\n\2\n\n", (ROOT / "docs/cli.md").read_text("utf-8")))

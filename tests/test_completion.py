@@ -87,7 +87,7 @@ def test_models_are_offered_beside_the_zoo(tmp_path):
 
 
 def test_the_fields_offered_for_set_are_the_recipe_s():
-    from viewsphere.recipe.reading.file import schema
+    from viewsphere.recipe.recipe import schema
 
     definitions = schema()["$defs"]
     known = set(schema()["properties"])

@@ -11,8 +11,8 @@ import pytest
 import yaml
 
 from viewsphere.errors import RecipeError, UserError
-from viewsphere.recipe.reading.file import _Loader, parse, read, schema
-from viewsphere.recipe.recipe import Recipe
+from viewsphere.recipe.reading.file import _Loader, parse, read
+from viewsphere.recipe.recipe import Recipe, schema
 
 ROOT = Path(__file__).parents[2]
 GOOD = """\

@@ -17,7 +17,8 @@ from shots import unit_box
 from viewsphere.engines.shared.blender.options import PRESETS
 from viewsphere.errors import RecipeError
 from viewsphere.plugins import names
-from viewsphere.recipe.reading.file import read, schema
+from viewsphere.recipe.reading.file import read
+from viewsphere.recipe.recipe import schema
 from viewsphere.recipe.starts import FIRST, kinds, start
 
 

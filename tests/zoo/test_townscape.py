@@ -10,8 +10,8 @@ import pytest
 import viewsphere_zoo as zoo
 from quick import quick
 from viewsphere_zoo.families import driveway, fence, hedge
-from viewsphere_zoo.families.house import House, house
 from viewsphere_zoo.families.house import draw as draw_house
+from viewsphere_zoo.families.house import house
 from viewsphere_zoo.families.lamp_post import LampPost, lamp_post
 from viewsphere_zoo.families.landscape import Landscape, landscape
 from viewsphere_zoo.families.road_sign import RoadSign, road_sign
@@ -19,6 +19,7 @@ from viewsphere_zoo.families.street import draw as draw_street
 from viewsphere_zoo.families.street import plots, street
 from viewsphere_zoo.families.tree import Tree, tree
 from viewsphere_zoo.townscape import textures
+from viewsphere_zoo.townscape.building import House
 from zoo_mesh import assert_sound, drawn, faces, outward_share, part_vertices, seeds
 
 SIZES = {

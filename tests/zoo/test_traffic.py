@@ -9,16 +9,20 @@ import pytest
 
 import viewsphere_zoo as zoo
 from quick import quick
-from viewsphere_zoo.families.backpack import Backpack, backpack
+from viewsphere_zoo.coachwork.lorry import Truck
+from viewsphere_zoo.coachwork.saloon import Bus
+from viewsphere_zoo.families.backpack import backpack
 from viewsphere_zoo.families.bollard import Bollard, bollard
-from viewsphere_zoo.families.bus import Bus, bus
+from viewsphere_zoo.families.bus import bus
 from viewsphere_zoo.families.fountain import Fountain, fountain
 from viewsphere_zoo.families.motorcycle import Motorcycle, motorcycle
-from viewsphere_zoo.families.shop import Shop, shop
+from viewsphere_zoo.families.shop import shop
 from viewsphere_zoo.families.traffic_cone import TrafficCone, traffic_cone
 from viewsphere_zoo.families.traffic_light import TrafficLight, traffic_light
-from viewsphere_zoo.families.truck import Truck, truck
+from viewsphere_zoo.families.truck import truck
+from viewsphere_zoo.sewing.design import Backpack
 from viewsphere_zoo.townscape.lettering import lettering
+from viewsphere_zoo.townscape.shopfront import Shop
 from zoo_mesh import assert_sound, drawn, outward_share, part_vertices, seeds
 
 SIZES = {

@@ -131,7 +131,7 @@ def schema() -> None:
     """Print the recipe's JSON schema, for editors."""
 
     from viewsphere.labels import channels, on_request
-    from viewsphere.recipe.reading.file import schema as recipe_schema
+    from viewsphere.recipe.recipe import schema as recipe_schema
 
     print_json(recipe_schema(channels=tuple(channels()), annotations=tuple(on_request())))
 

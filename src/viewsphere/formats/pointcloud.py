@@ -23,7 +23,6 @@ from viewsphere.files import read_bytes
 from viewsphere.formats import Scope
 from viewsphere.formats.shared.writing.export_files import check_files
 from viewsphere.formats.shared.writing.refusals import any_camera
-from viewsphere.model.annotations.point_cloud import PointCloud
 from viewsphere.model.channel import missing
 from viewsphere.model.fields.frozen import Frozen
 from viewsphere.model.sample import Sample
@@ -99,7 +98,7 @@ def _name(dataset: Dataset, sample: Sample) -> str:
 
 
 def _content(sample: Sample, options: Options) -> bytes:
-    cloud = PointCloud.of(sample, options.axes, options.surface)
+    cloud = sample.point_cloud(options.axes, options.surface)
     columns = dict(zip("xyz", cloud.points.astype(np.float32).T, strict=True))
     if cloud.colors is not None:
         columns |= dict(zip(("red", "green", "blue"), cloud.colors.T, strict=True))

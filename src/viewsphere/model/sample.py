@@ -317,7 +317,11 @@ class Sample(Shown):
         """
         from viewsphere.model.annotations.point_cloud import PointCloud
 
-        return PointCloud.of(self, axes, surface)
+        categories = {o.id: o.category_id for o in self.objects}
+        try:
+            return PointCloud.of(self.channels, self.camera, categories, axes, surface)
+        except ValueError as error:
+            raise StoreError(f"frame {self.index}: {error}") from None
 
     @property
     def voxel_grid(self) -> VoxelGrid:

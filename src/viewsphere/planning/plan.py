@@ -500,7 +500,7 @@ def plan(recipe: Recipe | str | PathLike[str], shot_frames: int | None = None) -
             check_keys(planned.kept_keys)
         planned = _composed(planned)
         if recipe.time is not None:
-            check_sequences(planned)
+            check_sequences(planned, planned.sampler)
         return planned.changed(credits=_credits(planned))
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import re
-from collections.abc import Generator, Mapping
+from collections.abc import Generator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from os import PathLike
@@ -447,6 +447,28 @@ class Recipe(Shown, Frozen):
         for name in () if self.time is None else self.scene.flickering:
             plain.setdefault("scene", {}).setdefault(name, {})["draw"] = "per_frame"
         return dump(plain)
+
+
+def schema(**names: Sequence[str]) -> dict[str, Any]:
+    """JSON schema (draft 2020-12) of recipe files, with a description of every field; `names`: all valid names that the fields
+    `channels` and `annotations` list, if given.
+    """
+    whole = Recipe.model_json_schema()
+    for field, known in names.items():
+        whole["properties"][field]["items"]["enum"] = list(known)
+    path = {"type": "string", "minLength": 1}
+    extends = {
+        "anyOf": [path, {"type": "array", "items": path}],
+        "description": "another recipe, or several, whose fields hold where this one says nothing",
+    }
+    return {
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        **whole,
+        "properties": {"extends": extends, **whole["properties"]},
+        "required": [],
+        "anyOf": [{"required": ["extends"]}, {"required": whole["required"]}],
+        "title": "viewsphere recipe",
+    }
 
 
 def _plain(value: Any) -> Any:

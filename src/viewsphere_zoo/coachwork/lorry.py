@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import Literal
 
 import numpy as np
 
@@ -12,17 +12,64 @@ from viewsphere_zoo.coachwork import heavy, lights, structure
 from viewsphere_zoo.coachwork.coats import Coats
 from viewsphere_zoo.coachwork.hull import Arch, Hull
 from viewsphere_zoo.coachwork.outline import Outline
+from viewsphere_zoo.coachwork.wheels import Wheel
 from viewsphere_zoo.shapes.assembly import Piece
+from viewsphere_zoo.shapes.paint import Color
 from viewsphere_zoo.shapes.panels import in_quad, panel, raised, ribbon, straight
 from viewsphere_zoo.shapes.rods import rod, shifted
 from viewsphere_zoo.shapes.solids import Float, Solid, both_sides, join, loft, moved, rounded_box, tube
 from viewsphere_zoo.townscape.surfaces import cuboid
 
-if TYPE_CHECKING:
-    from viewsphere_zoo.families.truck import Truck
-
 RAIL = 0.42
 """x of the chassis' side members, metres."""
+
+
+Load = Literal["box", "cold_box", "curtain", "dropside", "tipper"]
+
+
+Goods = Literal["none", "crates", "pipes", "gravel"]
+
+
+@dataclass(frozen=True)
+class Truck:
+    """Parameters of a lorry; lengths in metres, colours sRGB 0..1.
+
+    length, width, height: of the whole lorry without mirrors (height is the box's); cab_*: of the cab; roundness: 0 boxy to 1
+    soft; rake: how far the windscreen leans back; axles: 2 or 3; slats: bars of the grille; name: capitals on the box, empty
+    for none; goods: on an open bed or in a tub.
+    """
+
+    load: Load = "box"
+    length: float = 8.2
+    width: float = 2.5
+    height: float = 3.6
+    cab_length: float = 1.95
+    cab_width: float = 2.35
+    cab_height: float = 2.75
+    roundness: float = 0.4
+    rake: float = 0.12
+    axles: int = 2
+    wheel_radius: float = 0.47
+    slats: int = 4
+    chrome: bool = False
+    round_lamps: bool = False
+    high_roof: bool = False
+    visor: bool = True
+    deflector: bool = False
+    livery: Literal["plain", "stripe", "both", "wedge"] = "stripe"
+    name: str = "EXPRESS"
+    goods: Goods = "crates"
+    color: Color = (0.1, 0.26, 0.55)
+    load_color: Color = (0.93, 0.93, 0.92)
+    mark_color: Color = (0.1, 0.26, 0.55)
+    rim_color: Color = (0.75, 0.76, 0.78)
+    painted_bumper: bool = False
+    glass_color: Color = (0.13, 0.155, 0.17)
+
+    @property
+    def wheel(self) -> Wheel:
+        """The measures of the lorry's tyres."""
+        return Wheel(radius=self.wheel_radius, width=0.58 * self.wheel_radius, rim=0.57)
 
 
 @dataclass(frozen=True)

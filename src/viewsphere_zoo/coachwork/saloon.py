@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import Literal
 
 import numpy as np
 
@@ -13,14 +13,59 @@ from viewsphere_zoo.coachwork import heavy, lights, structure
 from viewsphere_zoo.coachwork.coats import Coats
 from viewsphere_zoo.coachwork.hull import Arch, Hull
 from viewsphere_zoo.coachwork.outline import Outline
+from viewsphere_zoo.coachwork.wheels import Wheel
 from viewsphere_zoo.shapes.assembly import Piece
-from viewsphere_zoo.shapes.paint import lamp
+from viewsphere_zoo.shapes.paint import Color, lamp
 from viewsphere_zoo.shapes.panels import raised, ribbon, straight
 from viewsphere_zoo.shapes.solids import both_sides, join, mirrored, moved, rounded_box, tube
 from viewsphere_zoo.townscape.lettering import lettering
 
-if TYPE_CHECKING:
-    from viewsphere_zoo.families.bus import Bus, Style
+Style = Literal["city", "coach", "double_decker"]
+
+
+Livery = Literal["plain", "stripe", "double", "sweep"]
+
+
+RoofUnit = Literal["none", "rear", "front", "long"]
+
+
+@dataclass(frozen=True)
+class Bus:
+    """Parameters of a bus; lengths in metres, colours sRGB 0..1.
+
+    roundness: 0 boxy to 1 soft; pitch: distance from window to window; flush: whether panes lie over one dark band; doors: 1
+    to 3, on door_side; split: a windscreen of two panes; route: text on its display, capitals and digits; skirt_color: the
+    wall below the bumpers' line, stripe_color: of its livery.
+    """
+
+    style: Style = "city"
+    length: float = 11.9
+    width: float = 2.52
+    height: float = 3.05
+    roundness: float = 0.4
+    wheel_radius: float = 0.48
+    pitch: float = 1.45
+    flush: bool = True
+    doors: int = 2
+    door_side: Literal["left", "right"] = "right"
+    split: bool = False
+    lamps: Literal["slim", "block", "round"] = "block"
+    livery: Livery = "plain"
+    roof_unit: RoofUnit = "rear"
+    rear_window: bool = True
+    route: str = "42 STATION"
+    color: Color = (0.72, 0.08, 0.09)
+    skirt_color: Color = (0.72, 0.08, 0.09)
+    roof_color: Color = (0.92, 0.92, 0.9)
+    stripe_color: Color = (0.93, 0.93, 0.9)
+    rim_color: Color = (0.72, 0.73, 0.75)
+    glass_color: Color = (0.12, 0.145, 0.16)
+
+    @property
+    def wheel(self) -> Wheel:
+        """The measures of the bus' tyres."""
+        return Wheel(radius=self.wheel_radius, width=0.28, rim=0.58)
+
 
 Band = tuple[float, float]
 

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Literal
-
 import numpy as np
 
 from viewsphere.assets.mesh import Mesh
@@ -13,6 +10,7 @@ from viewsphere.plugins.family import ZooFamily
 from viewsphere_zoo.sewing.carrying import back, handle, pockets, sides, straps
 from viewsphere_zoo.sewing.closings import CLOSINGS
 from viewsphere_zoo.sewing.cloth import coats, main_bag
+from viewsphere_zoo.sewing.design import Backpack, Style
 from viewsphere_zoo.shapes.assembly import Piece, assemble
 from viewsphere_zoo.shapes.paint import Color
 from viewsphere_zoo.shapes.solids import moved
@@ -34,32 +32,6 @@ SKELETON = (
     ("strap_left", "bottom_rear_left"),
     ("strap_right", "bottom_rear_right"),
 )
-
-Style = Literal["school", "hiking", "roll_top", "flap"]
-
-
-@dataclass(frozen=True)
-class Backpack:
-    """Parameters of a backpack; metres, colours sRGB 0..1.
-
-    height, width, depth: of the bag without pockets; fill: 0 flat to 1 stuffed; pockets: number in front, 1 or 2; bottle: in
-    the side pocket on its left; mat: a rolled mat below or on top; seed draws the folds.
-    """
-
-    style: Style = "school"
-    height: float = 0.44
-    width: float = 0.3
-    depth: float = 0.17
-    fill: float = 0.6
-    pockets: int = 1
-    side_pockets: bool = True
-    bottle: bool = False
-    mat: bool = False
-    color: Color = (0.12, 0.25, 0.5)
-    second: Color = (0.12, 0.25, 0.5)
-    trim: Color = (0.07, 0.07, 0.08)
-    accent: Color = (0.9, 0.45, 0.1)
-    seed: int = 0
 
 
 def backpack(parameters: Backpack | None = None) -> Mesh:

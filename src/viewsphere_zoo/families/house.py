@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Literal
-
 import numpy as np
 
 from viewsphere.assets.mesh import Mesh
@@ -12,7 +9,7 @@ from viewsphere.model.annotations.keypoints import At, sided
 from viewsphere.plugins.family import ZooFamily
 from viewsphere_zoo.shapes.paint import Color
 from viewsphere_zoo.townscape import building
-from viewsphere_zoo.townscape.masonry import Bars
+from viewsphere_zoo.townscape.building import House, Roof, Wall
 from viewsphere_zoo.townscape.surfaces import finished
 
 KEYPOINTS = {
@@ -24,58 +21,6 @@ KEYPOINTS = {
     "door": At("door", (0, -1, 0)),
     "chimney": At("chimney", (0, 0, 1)),
 }
-
-Roof = Literal["gable", "front_gable", "hip", "flat"]
-Wall = Literal["brick", "plaster", "boards"]
-Porch = Literal["none", "canopy", "posts"]
-
-
-@dataclass(frozen=True)
-class House:
-    """Parameters of a house; lengths in metres, colours sRGB 0..1.
-
-    width, depth: of the main block; roof: gable has its ridge across the front, front_gable shows its gable there; slope: rise
-    over run; wing: whether a narrow gabled block projects from the front; garage: 1 on the house's left (+X), -1 right, 0 none;
-    upper: the wall of the upper storey or gable, None if it matches the wall below; seed draws the rest: curtains, grain.
-    """
-
-    width: float = 9.5
-    depth: float = 8.0
-    storeys: int = 2
-    roof: Roof = "gable"
-    slope: float = 0.75
-    eaves: float = 0.4
-    wing: bool = False
-    garage: int = 1
-    dormers: int = 0
-    porch: Porch = "canopy"
-    chimney: bool = True
-    wall: Wall = "brick"
-    upper: Wall | None = None
-    wall_color: Color = (0.6, 0.34, 0.26)
-    upper_color: Color = (0.9, 0.88, 0.83)
-    roof_color: Color = (0.34, 0.2, 0.16)
-    roof_wave: float = 0.35
-    trim_color: Color = (0.93, 0.93, 0.91)
-    door_color: Color = (0.1, 0.22, 0.16)
-    bars: Bars = "cross"
-    shutters: bool = False
-    seed: int = 0
-
-    @property
-    def footprint(self) -> tuple[float, float]:
-        """Width and depth of the outline of all walls."""
-        return self.width + (building.GARAGE if self.garage else 0.0), self.depth + (building.WING if self.wing else 0.0)
-
-    @property
-    def garage_x(self) -> float | None:
-        """x of the middle of the garage's door, None without one."""
-        return self.garage * self.width / 2 if self.garage else None
-
-    @property
-    def door_x(self) -> float:
-        """x of the middle of the front door."""
-        return building.layout(self).door_x - self.garage * building.GARAGE / 2
 
 
 def house(parameters: House | None = None) -> Mesh:

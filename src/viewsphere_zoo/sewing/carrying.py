@@ -13,7 +13,7 @@ from viewsphere_zoo.shapes.rods import shifted, smooth
 from viewsphere_zoo.shapes.solids import Float, both_sides, join, lathe, mirrored, moved, rounded_box
 
 if TYPE_CHECKING:
-    from viewsphere_zoo.families.backpack import Backpack
+    from viewsphere_zoo.sewing.design import Backpack
 
 
 def _strap_line(p: Backpack) -> tuple[Float, Float]:

@@ -14,7 +14,7 @@ from viewsphere_zoo.shapes.sheets import sheet
 from viewsphere_zoo.shapes.solids import Solid, both_sides, join, lathe, moved, rounded_box, turned
 
 if TYPE_CHECKING:
-    from viewsphere_zoo.families.backpack import Backpack
+    from viewsphere_zoo.sewing.design import Backpack
 
 
 def school(p: Backpack, bag: Bag, c: dict[str, Material]) -> list[Piece]:

@@ -14,7 +14,7 @@ from viewsphere_zoo.shapes.sheets import sheet
 from viewsphere_zoo.shapes.solids import Float, Solid, curve, loft, moved, rounded_box, tube
 
 if TYPE_CHECKING:
-    from viewsphere_zoo.families.backpack import Backpack
+    from viewsphere_zoo.sewing.design import Backpack
 
 
 @dataclass(frozen=True)

@@ -4,21 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import Literal
 
 import numpy as np
 
 from viewsphere.assets.mesh import Image, Material
 from viewsphere_zoo.shapes.assembly import Piece
-from viewsphere_zoo.shapes.paint import coated, linear, metal
+from viewsphere_zoo.shapes.paint import Color, coated, linear, metal
 from viewsphere_zoo.shapes.solids import Solid, join, moved, tube, turned
 from viewsphere_zoo.townscape import roofs, textures
-from viewsphere_zoo.townscape.masonry import Joinery, Opening, facade, filled
+from viewsphere_zoo.townscape.masonry import Bars, Joinery, Opening, facade, filled
 from viewsphere_zoo.townscape.surfaces import cuboid
 from viewsphere_zoo.townscape.textures import textured
-
-if TYPE_CHECKING:
-    from viewsphere_zoo.families.house import House
 
 GARAGE = 3.4
 """Width of a garage's block, metres."""
@@ -32,6 +29,63 @@ FLOOR = 0.18
 
 SEAM = FLOOR + STOREY + 0.5
 """Height at which the upper storey's wall begins if it differs from the wall below, metres."""
+
+
+Roof = Literal["gable", "front_gable", "hip", "flat"]
+
+
+Wall = Literal["brick", "plaster", "boards"]
+
+
+Porch = Literal["none", "canopy", "posts"]
+
+
+@dataclass(frozen=True)
+class House:
+    """Parameters of a house; lengths in metres, colours sRGB 0..1.
+
+    width, depth: of the main block; roof: gable has its ridge across the front, front_gable shows its gable there; slope: rise
+    over run; wing: whether a narrow gabled block projects from the front; garage: 1 on the house's left (+X), -1 right, 0 none;
+    upper: the wall of the upper storey or gable, None if it matches the wall below; seed draws the rest: curtains, grain.
+    """
+
+    width: float = 9.5
+    depth: float = 8.0
+    storeys: int = 2
+    roof: Roof = "gable"
+    slope: float = 0.75
+    eaves: float = 0.4
+    wing: bool = False
+    garage: int = 1
+    dormers: int = 0
+    porch: Porch = "canopy"
+    chimney: bool = True
+    wall: Wall = "brick"
+    upper: Wall | None = None
+    wall_color: Color = (0.6, 0.34, 0.26)
+    upper_color: Color = (0.9, 0.88, 0.83)
+    roof_color: Color = (0.34, 0.2, 0.16)
+    roof_wave: float = 0.35
+    trim_color: Color = (0.93, 0.93, 0.91)
+    door_color: Color = (0.1, 0.22, 0.16)
+    bars: Bars = "cross"
+    shutters: bool = False
+    seed: int = 0
+
+    @property
+    def footprint(self) -> tuple[float, float]:
+        """Width and depth of the outline of all walls."""
+        return self.width + (GARAGE if self.garage else 0.0), self.depth + (WING if self.wing else 0.0)
+
+    @property
+    def garage_x(self) -> float | None:
+        """x of the middle of the garage's door, None without one."""
+        return self.garage * self.width / 2 if self.garage else None
+
+    @property
+    def door_x(self) -> float:
+        """x of the middle of the front door."""
+        return layout(self).door_x - self.garage * GARAGE / 2
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,7 @@ import numpy as np
 from viewsphere_zoo.townscape.plan import PLOT
 
 if TYPE_CHECKING:
-    from viewsphere_zoo.families.house import House
+    from viewsphere_zoo.townscape.building import House
 
 SETBACK = 15.2
 """x of the houses' nearest wall, metres."""

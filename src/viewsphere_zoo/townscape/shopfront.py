@@ -6,20 +6,81 @@ Like a facade, it is in y = 0 and faces -Y, its middle at x = 0, its foot at z =
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import Literal
 
 import numpy as np
 
 from viewsphere.assets.mesh import Material
 from viewsphere_zoo.shapes.assembly import Piece
+from viewsphere_zoo.shapes.paint import Color
 from viewsphere_zoo.shapes.rods import rod
 from viewsphere_zoo.shapes.solids import Solid, join, lathe, moved, rounded_box, turned
 from viewsphere_zoo.townscape.lettering import lettering
-from viewsphere_zoo.townscape.masonry import REVEAL, Opening
+from viewsphere_zoo.townscape.masonry import REVEAL, Bars, Opening
 from viewsphere_zoo.townscape.surfaces import cuboid, prism
 
-if TYPE_CHECKING:
-    from viewsphere_zoo.families.shop import Shop
+Roof = Literal["flat", "pitched", "mansard"]
+
+
+Wall = Literal["brick", "stone", "plaster"]
+
+
+@dataclass(frozen=True)
+class Shop:
+    """Parameters of a town building; lengths in metres, colours sRGB 0..1.
+
+    width: from party wall to party wall; storeys: with the ground floor; ground, storey: heights of the ground floor and of
+    each floor above; side_door: the flats' door at the left (1, +X), right (-1) or nowhere in front (0); door, pane, riser,
+    transom: the shop's door, width of its panes, height of the wall below them, bars near their top; name: on the signs,
+    capitals; awning: how far it reaches out, 0 for none; balconies: their depth, 0 for none; painted: the name on the party
+    walls; chimneys: sides that have one; seed draws the rest: curtains, goods, grain.
+    """
+
+    width: float = 7.0
+    depth: float = 10.0
+    storeys: int = 3
+    ground: float = 3.9
+    storey: float = 3.0
+    wall: Wall = "brick"
+    roof: Roof = "pitched"
+    slope: float = 0.75
+    dormers: bool = False
+    gabled: bool = True
+    hut: bool = False
+    chimneys: tuple[int, ...] = (1,)
+    pitch: float = 2.3
+    window: float = 1.1
+    bars: Bars = "sash"
+    surrounds: bool = True
+    courses: bool = True
+    quoins: bool = False
+    dentils: bool = True
+    painted: bool = True
+    balconies: float = 0.0
+    side_door: int = 1
+    door: Literal["left", "middle", "right"] = "middle"
+    pane: float = 1.3
+    riser: float = 0.55
+    transom: bool = True
+    awning: float = 1.2
+    striped: bool = True
+    hanging_sign: Literal["", "round", "square"] = ""
+    name: str = "BAKERY"
+    wall_color: Color = (0.6, 0.34, 0.26)
+    trim_color: Color = (0.86, 0.84, 0.79)
+    roof_color: Color = (0.33, 0.34, 0.37)
+    frame_color: Color = (0.93, 0.93, 0.91)
+    front_color: Color = (0.1, 0.24, 0.18)
+    board_color: Color = (0.1, 0.24, 0.18)
+    letter_color: Color = (0.93, 0.86, 0.6)
+    awning_color: Color = (0.7, 0.1, 0.1)
+    seed: int = 0
+
+    @property
+    def height(self) -> float:
+        """Height of the walls, metres."""
+        return self.ground + (self.storeys - 1) * self.storey
+
 
 FASCIA = 0.7
 """Height of the board that bears the name, metres."""

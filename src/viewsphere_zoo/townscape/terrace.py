@@ -19,7 +19,7 @@ from viewsphere_zoo.townscape.surfaces import cuboid, prism
 from viewsphere_zoo.townscape.textures import textured
 
 if TYPE_CHECKING:
-    from viewsphere_zoo.families.shop import Shop
+    from viewsphere_zoo.townscape.shopfront import Shop
 
 
 @dataclass(frozen=True)

@@ -6,11 +6,9 @@ Kinds import from here: their inputs (`Start`, `Pose`), paths (`Lane`, `curve_th
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 from viewsphere.composing.motion.shared.heading import Heading, headed, to_the_right
 from viewsphere.composing.motion.shared.made import Mover, check_motion, check_motions, mover
-from viewsphere.composing.motion.shared.start import Origin, Pose, Start
+from viewsphere.composing.motion.shared.start import Move, Origin, Pose, Start
 from viewsphere.composing.motion.shared.way import curve_through
 from viewsphere.model.fields.numbers import Strength
 from viewsphere.model.place import Lane
@@ -35,8 +33,3 @@ __all__ = [
 
 Amplitude = Drawn[tuple[Drawn[Strength], Drawn[Strength], Drawn[Strength]]]
 """Amplitudes to either side, along or about x, y and z; 0 or more."""
-
-Move = Callable[[float, Pose], Pose | None]
-"""Returns the pose at a time, seconds from the sequence's first instant, given the thing's pose without this motion; None while
-the thing is absent. Called for any times in any order.
-"""

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from viewsphere.labels import channel_labels, labels_of, makers, sample_labels_of
+from viewsphere.labels.shared.catalogue import channel_labels, labels_of, makers, sample_labels_of
 from viewsphere.labels.shared.context import LabelContext
 from viewsphere.labels.shared.placement import Placement
 from viewsphere.labels.shared.record import Makers, computed
@@ -52,7 +52,7 @@ def observe(
 
 def computed_channel(label: ChannelLabel, context: LabelContext) -> NDArray[Any]:
     """A label of pixels, computed with access only to the inputs in its `needs`."""
-    return label.compute(context.read_by(label))
+    return label.compute(context.read_by(label.name, label.needs))
 
 
 def context_of(
@@ -109,7 +109,7 @@ def annotated(context: LabelContext) -> tuple[ObjectAnnotation, ...]:
     no pixel has an empty mask, no `box2d` and visibility 0.
     """
     requested = labels_of(context.requested)
-    seen = [(label, context.read_by(label)) for label in requested if label.compute is not derived]
+    seen = [(label, context.read_by(label.name, label.needs)) for label in requested if label.compute is not derived]
     every = Makers(makers(), requested, context.requested, "this frame")
     return tuple(
         computed(i + 1, [label.compute(own, i) for label, own in seen], place, every)
@@ -122,7 +122,7 @@ def sample_values(context: LabelContext, objects: Sequence[ObjectAnnotation]) ->
     """The fields of the requested labels of whole pictures; `objects` are `annotated(context)`."""
     found: dict[str, Any] = {}
     for label in sample_labels_of(context.requested):
-        found |= label.compute(context.read_by(label), objects)
+        found |= label.compute(context.read_by(label.name, label.needs), objects)
     return found
 
 

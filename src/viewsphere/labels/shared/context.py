@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any, Generic, TypeVar
+from typing import Any, Generic, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,9 +22,6 @@ from viewsphere.truth.raster.geometry import Geometry
 from viewsphere.truth.raster.visibility import Instances, Visibility, homogeneous, lens_rays, rasterize
 from viewsphere.truth.shot_views import NeighbourViews
 from viewsphere.truth.view import View
-
-if TYPE_CHECKING:
-    from viewsphere.labels.shared.spec import LabelSpec
 
 NeedT = TypeVar("NeedT")
 OptionsT = TypeVar("OptionsT", bound=Frozen)
@@ -76,7 +73,7 @@ class LabelContext:
 
     `placements` belong to the objects 1, 2, ...; they are None for absent objects, and labels of pixels need none. `neighbours`
     are views to compare the picture with; `requested` are names of annotations; `options` are the labels' options by name.
-    `label` is the label that reads the context, which gets only the inputs in its `needs`; None: all inputs.
+    `label` names the label that reads the context, which gets only the inputs in its `needs`; None: all inputs.
     """
 
     geometry: Geometry
@@ -86,7 +83,8 @@ class LabelContext:
     neighbours: NeighbourViews | None = None
     requested: tuple[str, ...] = ()
     options: Mapping[str, Mapping[str, Any]] = field(default_factory=dict[str, Mapping[str, Any]])
-    label: LabelSpec | None = None
+    label: str = ""
+    needs: tuple[Need[Any], ...] | None = None
     _isolated: dict[int, IsolatedMask] = field(default_factory=dict[int, "IsolatedMask"], repr=False)
     _made: dict[str, Any] = field(default_factory=dict[str, Any], repr=False)
     _matches: dict[Need[Any], Match | None] = field(default_factory=dict[Need[Any], "Match | None"], repr=False)
@@ -97,9 +95,9 @@ class LabelContext:
             self._made[name] = make()
         return self._made[name]
 
-    def read_by(self, label: LabelSpec) -> LabelContext:
-        """Return this context for a label; all contexts of a picture share their results."""
-        return replace(self, label=label)
+    def read_by(self, label: str, needs: tuple[Need[Any], ...]) -> LabelContext:
+        """Return this context for a label with these needs; all contexts of a picture share their results."""
+        return replace(self, label=label, needs=needs)
 
     def get(self, need: Need[NeedT]) -> NeedT | None:
         """Return the input that a need describes; None for a picture without neighbours. Raises PluginError for a need that the
@@ -109,15 +107,15 @@ class LabelContext:
         return need.read(self.neighbours) if self.neighbours else None
 
     def _check(self, need: Need[Any]) -> None:
-        if self.label is not None and need not in self.label.needs:
-            raise PluginError(f"label {self.label.name}: `compute` reads {need}, which `needs` does not list. Add it there.")
+        if self.needs is not None and need not in self.needs:
+            raise PluginError(f"label {self.label}: `compute` reads {need}, which `needs` does not list. Add it there.")
 
     @property
     def own_view(self) -> View | None:
         """The picture's own view, to compare with points of other views; None for a picture without neighbours. Every label
         with any need has access to it.
         """
-        if self.label is None or not self.label.needs:
+        if not self.needs:
             self._check(OwnView())
         return self.neighbours.view(0, None) if self.neighbours else None
 

@@ -2,20 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
-from viewsphere.errors import StoreError, UserError
+from viewsphere.errors import UserError
 from viewsphere.geometry.camera import pixel_rays
 from viewsphere.geometry.rotation import transform
 from viewsphere.model.channel import picture_of
-from viewsphere.model.sample import Sample
+from viewsphere.model.sensors.camera import Camera
 from viewsphere.validation.errors import one_of
 
 Float = NDArray[np.float64]
+Channels = Mapping[str, NDArray[Any]]
 Axes = Literal["camera", "world"]
 Surface = Literal["visible", "complete"]
 
@@ -49,67 +51,71 @@ class PointCloud:
         return len(self.points)
 
     @classmethod
-    def of(cls, sample: Sample, axes: Axes = "camera", surface: Surface = "visible") -> PointCloud:
-        """Return the points of a sample; see `Sample.point_cloud`."""
+    def of(cls, channels: Channels, camera: Camera, categories: Mapping[int, int], axes: Axes, surface: Surface) -> PointCloud:
+        """Return the points of a camera's channels; see `Sample.point_cloud`. `categories`: of the objects, by their ids.
+
+        Raises ValueError for a missing channel.
+        """
         for name, value, known in (("axes", axes, get_args(Axes)), ("surface", surface, get_args(Surface))):
             if value not in known:
                 raise UserError(f"point_cloud: {name}: {one_of(value, known)}")
-        cloud = _complete(sample) if surface == "complete" else _visible(sample)
-        return cloud.moved(sample) if axes == "world" else cloud
+        cloud = (_complete if surface == "complete" else _visible)(channels, camera, categories)
+        return cloud._in_world(camera) if axes == "world" else cloud
 
-    def moved(self, sample: Sample) -> PointCloud:
-        """The point cloud in the world's axes, converted from the axes of the sample's camera."""
-        camera = sample.camera
+    def _in_world(self, camera: Camera) -> PointCloud:
+        """The point cloud in the world's axes, converted from the camera's."""
         normals = None if self.normals is None else transform(camera.R.T, self.normals).astype(np.float32)
         points = transform(camera.R.T, self.points - camera.t)
         return PointCloud("world", points, self.visible, self.colors, normals, self.instances, self.categories)
 
 
-def _visible(sample: Sample) -> PointCloud:
+def _visible(channels: Channels, camera: Camera, categories: Mapping[int, int]) -> PointCloud:
     """A point for each pixel that shows a surface, row by row."""
-    rays = pixel_rays(sample.camera.intrinsics)
-    if "depth_ray" in sample.channels:
-        lengths = _needed(sample, "depth_ray").astype(np.float64)
-        if not sample.camera.lens.has_unit_rays:
+    rays = pixel_rays(camera.intrinsics)
+    if "depth_ray" in channels:
+        lengths = _needed(channels, "depth_ray").astype(np.float64)
+        if not camera.lens.has_unit_rays:
             lengths = lengths / np.sqrt((rays * rays).sum(axis=-1))
     else:
         with np.errstate(divide="ignore"):
-            lengths = _needed(sample, "depth").astype(np.float64) / rays[..., 2]
+            lengths = _needed(channels, "depth").astype(np.float64) / rays[..., 2]
     seen = np.isfinite(lengths) & np.isfinite(rays).all(axis=-1)
-    picture = picture_of(sample.channels)
+    picture = picture_of(channels)
     return PointCloud(
         "camera",
         rays[seen] * lengths[seen][:, None],
         np.ones(int(seen.sum()), np.bool_),
-        sample.picture[seen][:, :3] if picture else None,
-        _taken(sample, "normals", seen),
-        *_labels(sample, _taken(sample, "instances", seen)),
+        channels[picture][seen][:, :3] if picture else None,
+        _taken(channels, "normals", seen),
+        *_labels(categories, _taken(channels, "instances", seen)),
     )
 
 
-def _complete(sample: Sample) -> PointCloud:
+def _complete(channels: Channels, camera: Camera, categories: Mapping[int, int]) -> PointCloud:
     """The points of `surface_samples`, visible or not; hidden points have no colours."""
-    rows, camera = _needed(sample, "surface_samples"), sample.camera
+    rows = _needed(channels, "surface_samples")
     points, normals = transform(camera.R, rows["point"]) + camera.t, transform(camera.R, rows["normal"])
     ids = np.ascontiguousarray(rows["object"])
-    return PointCloud("camera", points, rows["state"] == VISIBLE, None, normals.astype(np.float32), *_labels(sample, ids))
+    return PointCloud("camera", points, rows["state"] == VISIBLE, None, normals.astype(np.float32), *_labels(categories, ids))
 
 
-def _labels(sample: Sample, instances: NDArray[Any] | None) -> tuple[NDArray[np.int32], NDArray[np.int32]] | tuple[None, None]:
+def _labels(
+    categories: Mapping[int, int], instances: NDArray[Any] | None
+) -> tuple[NDArray[np.int32], NDArray[np.int32]] | tuple[None, None]:
     """The object and the category of each point."""
     if instances is None:
         return None, None
-    table = np.zeros(max([int(instances.max(initial=0)), *(o.id for o in sample.objects)], default=0) + 1, np.int32)
-    for o in sample.objects:
-        table[o.id] = o.category_id
+    table = np.zeros(max([int(instances.max(initial=0)), *categories], default=0) + 1, np.int32)
+    for number, category in categories.items():
+        table[number] = category
     return instances.astype(np.int32), table[instances]
 
 
-def _taken(sample: Sample, name: str, seen: NDArray[np.bool_]) -> NDArray[Any] | None:
-    return sample.channels[name][seen] if name in sample.channels else None
+def _taken(channels: Channels, name: str, seen: NDArray[np.bool_]) -> NDArray[Any] | None:
+    return channels[name][seen] if name in channels else None
 
 
-def _needed(sample: Sample, name: str) -> NDArray[Any]:
-    if name not in sample.channels:
-        raise StoreError(f"frame {sample.index}: expected the channel {name}, found none: add it to the recipe's channels")
-    return sample.channels[name]
+def _needed(channels: Channels, name: str) -> NDArray[Any]:
+    if name not in channels:
+        raise ValueError(f"expected the channel {name}, found none: add it to the recipe's channels")
+    return channels[name]

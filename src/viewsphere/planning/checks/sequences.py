@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from functools import partial
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -17,11 +16,10 @@ from viewsphere.composing.viewpoints.sequence_poses import SequencePoses, Trajec
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.scene import IDENTITY, Matrix4
 from viewsphere.model.thing import Thing
+from viewsphere.planning.samplers.shared.sampling_context import SamplingContext
 from viewsphere.planning.samplers.shared.sequence_state import no_such_thing, piece_moving, target_moving, time_of
+from viewsphere.plugins.sampler import SamplerSpec
 from viewsphere.recipe.world.scenes import ScenesEntry
-
-if TYPE_CHECKING:
-    from viewsphere.planning.plan import Plan
 
 MOST_SUBJECTS = 1000
 """Number of subjects that are checked before rendering, the first ones; the others are checked when their shots are made."""
@@ -30,21 +28,21 @@ UNKNOWN = (np.nan, np.nan, np.nan)
 """Placeholder position of a thing whose model was not read."""
 
 
-def check_sequences(planned: Plan) -> None:
+def check_sequences(planned: SamplingContext, sampler: SamplerSpec) -> None:
     """Raise RecipeError for missing lanes, for cameras that look at absent things, and for impossible motions.
 
     The first sequence of each subject is checked; motions drawn for later sequences are checked when these are made.
     """
     checked = set[str]()
     for subject in planned.subjects[:MOST_SUBJECTS]:
-        cast = planned.sampler.cast(planned, subject, 0)
+        cast = sampler.cast(planned, subject, 0)
         lanes = () if planned.composition is None else planned.composition.lanes(subject, planned.scene_pose(0))
         _check_trajectory(planned, subject, cast, lanes)
         _check_motions(planned, subject, cast, lanes, checked)
     _check_pieces(planned)
 
 
-def _check_trajectory(planned: Plan, subject: str, cast: Sequence[ModelSpec], lanes: tuple[Lane, ...]) -> None:
+def _check_trajectory(planned: SamplingContext, subject: str, cast: Sequence[ModelSpec], lanes: tuple[Lane, ...]) -> None:
     """Compute the rig's pose at the first and at the last instant, with placeholder positions of the things."""
     assert isinstance(planned.pose_list, SequencePoses)
     if not isinstance(planned.pose_list.base, TrajectoryPoses):
@@ -59,7 +57,7 @@ def _check_trajectory(planned: Plan, subject: str, cast: Sequence[ModelSpec], la
     planned.pose_list.base.trajectory.poses(np.array([0.0, time.seconds_at(time.count - 1)]), world)
 
 
-def _check_thing(planned: Plan, wanted: int | str, cast: Sequence[ModelSpec]) -> None:
+def _check_thing(planned: SamplingContext, wanted: int | str, cast: Sequence[ModelSpec]) -> None:
     """Check that the thing that the camera looks at exists. It may also be scenery, which is known only once placed."""
     known = {number: spec.key for number, spec in enumerate(cast, 1)}
     scenery = planned.composition
@@ -71,7 +69,9 @@ def _check_thing(planned: Plan, wanted: int | str, cast: Sequence[ModelSpec]) ->
         raise no_such_thing(wanted, known)
 
 
-def _check_motions(planned: Plan, subject: str, cast: Sequence[ModelSpec], lanes: tuple[Lane, ...], checked: set[str]) -> None:
+def _check_motions(
+    planned: SamplingContext, subject: str, cast: Sequence[ModelSpec], lanes: tuple[Lane, ...], checked: set[str]
+) -> None:
     """Make the motions of the models, once for each model."""
     names = (subject, planned.pose_list.place(0))
     company, scenes = planned.recipe.scene.company, planned.recipe.scenes
@@ -89,7 +89,7 @@ def _nowhere(seconds: float) -> Matrix4:
     return IDENTITY
 
 
-def _check_pieces(planned: Plan) -> None:
+def _check_pieces(planned: SamplingContext) -> None:
     """Make the motions of a place's pieces, once for each pattern."""
     subject, pose = planned.subjects[0], planned.scene_pose(0)
     names = (subject, planned.pose_list.place(0))
@@ -98,7 +98,7 @@ def _check_pieces(planned: Plan) -> None:
         piece_moving(planned, Thing(id=0, model=piece.model), piece, names, lanes)
 
 
-def _pieces(planned: Plan, subject: str, pose: str | None) -> Iterator[SceneryPiece]:
+def _pieces(planned: SamplingContext, subject: str, pose: str | None) -> Iterator[SceneryPiece]:
     place = planned.recipe.scene.place
     if place is not None:
         yield from place_pieces(planned.recipe, place, draw_names(place.draw, subject, pose), lambda category, labels: 0)

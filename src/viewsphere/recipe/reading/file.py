@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, cast
 
@@ -220,27 +219,3 @@ def _float(text: str) -> float:
 def dump(data: dict[str, Any]) -> str:
     """Plain data as the text of a recipe file that `read` gives back."""
     return yaml.dump(data, Dumper=_Dumper, sort_keys=False, default_flow_style=None, allow_unicode=True, width=110)
-
-
-def schema(**names: Sequence[str]) -> dict[str, Any]:
-    """JSON schema (draft 2020-12) of recipe files, with a description of every field; `names`: all valid names that the fields
-    `channels` and `annotations` list, if given.
-    """
-    from viewsphere.recipe.recipe import Recipe
-
-    whole = Recipe.model_json_schema()
-    for field, known in names.items():
-        whole["properties"][field]["items"]["enum"] = list(known)
-    path = {"type": "string", "minLength": 1}
-    extends = {
-        "anyOf": [path, {"type": "array", "items": path}],
-        "description": "another recipe, or several, whose fields hold where this one says nothing",
-    }
-    return {
-        "$schema": "https://json-schema.org/draft/2020-12/schema",
-        **whole,
-        "properties": {"extends": extends, **whole["properties"]},
-        "required": [],
-        "anyOf": [{"required": ["extends"]}, {"required": whole["required"]}],
-        "title": "viewsphere recipe",
-    }

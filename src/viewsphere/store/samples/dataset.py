@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from array import array
 from bisect import bisect_right
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -14,7 +15,7 @@ from typing import TYPE_CHECKING, Any, Self, overload
 from numpy.typing import NDArray
 from pydantic import TypeAdapter
 
-from viewsphere.errors import StoreError
+from viewsphere.errors import StoreError, UserError
 from viewsphere.files import read_bytes
 from viewsphere.labels import channels
 from viewsphere.model.annotations.classes import SemanticClass
@@ -30,7 +31,7 @@ from viewsphere.store.paths import file_inside, files_inside, names
 from viewsphere.store.samples.channel_files import decode
 from viewsphere.store.samples.choice import Choice
 from viewsphere.store.samples.point_tracks import PointTracks, joined
-from viewsphere.store.samples.selection import Selection
+from viewsphere.store.samples.selection import Selection, check_fields
 from viewsphere.store.shots.folder import Store
 from viewsphere.store.shots.manifest import MANIFEST, Manifest
 from viewsphere.store.shots.records import Category, ModelInfo, typed
@@ -216,7 +217,16 @@ class Dataset(Shown, Sequence[Sample]):
         Raises:
             UserError: A field, split or sensor is not in the data set.
         """
-        return Selection(self, fields, split, sensor)
+        try:
+            check_fields(fields, self.plan.channels, self)
+        except UserError as error:
+            raise UserError(f"{self.root}: select: {error}") from None
+        if split is not None and split not in self.splits:
+            raise UserError(f"{self.root}: select: split: {one_of(split, self.splits)}")
+        numbers = None if split is None and sensor is None else array("q", self.of(split, sensor))
+        if sensor is not None and not numbers:
+            raise UserError(f"{self.root}: select: sensor: expected one that took pictures; found {sensor!r}")
+        return Selection(self.name, self, fields, numbers)
 
     def of(self, split: str | None = None, sensor: str | None = None) -> Iterator[int]:
         """Positions in the data set of the frames of a split and a sensor; reads all records.

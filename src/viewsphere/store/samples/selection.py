@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from array import array
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, overload
+from typing import Any, overload
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,9 +14,6 @@ from viewsphere.labels import Field, object_labels, on_request, sample_labels
 from viewsphere.model.sample import ObjectView, Rle, Sample
 from viewsphere.validation.errors import one_of
 from viewsphere.validation.quantity import quantity
-
-if TYPE_CHECKING:
-    from viewsphere.store.samples.dataset import Dataset
 
 OF_SAMPLE = ("index", "split", "sequence", "variation", "sensor", "instant", "time", "width", "height")
 OF_CAMERA = ("camera.K", "camera.R", "camera.t", "camera.P")
@@ -40,25 +36,17 @@ class Selection(Sequence[dict[str, Any]]):
         UserError: A field, split or sensor is not in the data set.
     """
 
-    def __init__(self, dataset: Dataset, fields: Sequence[str], split: str | None = None, sensor: str | None = None) -> None:
-        of_labels = (*_of_pictures(), *(f"objects.{name}" for name in _of_objects()))
-        known = (*dataset.plan.channels, *OF_SAMPLE, *OF_CAMERA, *OF_POSE, *of_labels)
-        for name in fields:
-            if name not in known:
-                raise UserError(f"{dataset.root}: select: {one_of(name, known)}")
-        _check_asked(dataset, fields)
-        if split is not None and split not in dataset.splits:
-            raise UserError(f"{dataset.root}: select: split: {one_of(split, dataset.splits)}")
-        self.dataset, self.fields, self.split, self.sensor = dataset, tuple(fields), split, sensor
-        self._numbers = None if split is None and sensor is None else array("q", dataset.of(split, sensor))
-        if sensor is not None and not self._numbers:
-            raise UserError(f"{dataset.root}: select: sensor: expected one that took pictures; found {sensor!r}")
+    def __init__(
+        self, name: str, samples: Sequence[Sample], fields: Sequence[str], numbers: Sequence[int] | None = None
+    ) -> None:
+        self.name, self.fields = name, tuple(fields)
+        self._samples, self._numbers = samples, numbers
 
     def __repr__(self) -> str:
-        return f"<Selection of {self.dataset.name}: {quantity(len(self), 'frame')}; {', '.join(self.fields)}>"
+        return f"<Selection of {self.name}: {quantity(len(self), 'frame')}; {', '.join(self.fields)}>"
 
     def __len__(self) -> int:
-        return len(self.dataset if self._numbers is None else self._numbers)
+        return len(self._samples if self._numbers is None else self._numbers)
 
     @overload
     def __getitem__(self, index: int) -> dict[str, Any]: ...
@@ -68,18 +56,24 @@ class Selection(Sequence[dict[str, Any]]):
         """The fields of the i-th frame; raises IndexError past the end, AttributeError where the frame lacks a channel."""
         if isinstance(index, slice):
             return [self[i] for i in range(*index.indices(len(self)))]
-        sample = self.dataset[index if self._numbers is None else self._numbers[index]]
+        sample = self._samples[index if self._numbers is None else self._numbers[index]]
         return {name: _value(sample, name) for name in self.fields}
 
 
-def _check_asked(dataset: Dataset, fields: Sequence[str]) -> None:
-    """Raise UserError for fields of labels that were not requested; the first frame is checked."""
+def check_fields(fields: Sequence[str], channels: Sequence[str], samples: Sequence[Sample]) -> None:
+    """Raise UserError for unknown fields, and for fields of labels that were not requested; the first sample is checked.
+    `channels`: the data set's.
+    """
+    of_labels = (*_of_pictures(), *(f"objects.{name}" for name in _of_objects()))
+    known = (*channels, *OF_SAMPLE, *OF_CAMERA, *OF_POSE, *of_labels)
+    for name in fields:
+        if name not in known:
+            raise UserError(one_of(name, known))
     labels = {field.name: label for label in on_request().values() for field in label.fields}
     for name in fields:
         label = labels.get(name.removeprefix("objects."))
-        if label and len(dataset) and not label.is_in(dataset[0]):
-            problem = f"expected what the data set has; found {name}: add {label.name} to the recipe's annotations"
-            raise UserError(f"{dataset.root}: select: {problem}")
+        if label and samples and not label.is_in(samples[0]):
+            raise UserError(f"expected what the data set has; found {name}: add {label.name} to the recipe's annotations")
 
 
 def _value(sample: Sample, name: str) -> Any:

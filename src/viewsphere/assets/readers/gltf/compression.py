@@ -5,9 +5,10 @@ https://github.com/KhronosGroup/glTF/tree/main/extensions: EXT_meshopt_compressi
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from importlib import import_module
 from importlib.util import find_spec
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,9 +16,6 @@ from numpy.typing import NDArray
 from viewsphere.assets.paths.folder import ModelFolder
 from viewsphere.assets.readers.gltf.field import Field
 from viewsphere.errors import ModelError
-
-if TYPE_CHECKING:
-    from viewsphere.assets.readers.gltf.document import Document
 
 DRACO = "KHR_draco_mesh_compression"
 MESHOPT = ("EXT_meshopt_compression", "KHR_meshopt_compression")
@@ -49,9 +47,8 @@ def meshopt_of(view: Field) -> tuple[str, Field] | None:
     return None
 
 
-def unpacked_view(document: Document, extension: str, fields: Field) -> bytes:
-    """The plain bytes of a bufferView compressed by meshoptimizer."""
-    folder = document.folder
+def unpacked_view(folder: ModelFolder, extension: str, fields: Field, slice_of: Callable[[Field], memoryview]) -> bytes:
+    """The plain bytes of a bufferView compressed by meshoptimizer; `slice_of` returns the packed bytes that fields name."""
     if not is_readable(extension):
         raise lacking(folder, extension)
     count, stride = fields.integer("count"), fields.integer("byteStride")
@@ -59,7 +56,7 @@ def unpacked_view(document: Document, extension: str, fields: Field) -> bytes:
     if mode not in MODES or kind not in FILTERS:
         raise fields.fail(f"a mode of {', '.join(MODES)} and a filter of {', '.join(FILTERS)}")
     folder.check("MAX_VERTICES", count, f"elements in {fields.where.rpartition('.')[2]}")
-    data = document.slice(fields)
+    data = slice_of(fields)
     try:
         decoded: NDArray[Any] = import_module("meshopt").decode_gltf_buffer(bytes(data), count, stride, mode, kind)
     except MemoryError:
@@ -71,10 +68,8 @@ def unpacked_view(document: Document, extension: str, fields: Field) -> bytes:
     return decoded.astype("<u2" if stride == 2 else "<u4").tobytes()
 
 
-def unpacked_primitive(document: Document, primitive: Field, fields: Field) -> dict[int, NDArray[Any]]:
+def unpacked_primitive(folder: ModelFolder, primitive: Field, fields: Field, data: memoryview) -> dict[int, NDArray[Any]]:
     """The elements of each accessor of a primitive compressed by Draco, by the accessor's number."""
-    folder = document.folder
-    data, _ = document.view(fields.integer("bufferView"))
     try:
         mesh = import_module("DracoPy").decode(bytes(data))
         by_id = {attribute["unique_id"]: np.asarray(attribute["data"]) for attribute in mesh.attributes}

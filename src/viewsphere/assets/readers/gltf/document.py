@@ -135,7 +135,7 @@ class Document:
         if packed is None or (not is_readable(packed[0]) and self._has_plain_copy(entry)):
             return self.slice(entry), stride
         if index not in self._views:
-            self._views[index] = unpacked_view(self, *packed)
+            self._views[index] = unpacked_view(self.folder, *packed, self.slice)
         return memoryview(self._views[index]), stride
 
     def _has_plain_copy(self, entry: Field) -> bool:
@@ -160,7 +160,8 @@ class Document:
         if is_readable(DRACO):
             position = primitive.get("attributes").integer("POSITION")
             if position not in self._elements:
-                self._elements |= unpacked_primitive(self, primitive, packed)
+                data, _ = self.view(packed.integer("bufferView"))
+                self._elements |= unpacked_primitive(self.folder, primitive, packed, data)
             return True
         if DRACO in {entry.value for entry in self.root.items("extensionsRequired")}:
             raise lacking(self.folder, DRACO)

@@ -6,12 +6,12 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 
 from viewsphere import plugins
-from viewsphere.composing.motion.shared.start import Pose, Start
+from viewsphere.composing.motion.shared.start import Move, Pose, Start
 from viewsphere.errors import RecipeError
 from viewsphere.model.scene import Matrix4
 from viewsphere.model.thing import Motion, TimeStep
@@ -20,9 +20,6 @@ from viewsphere.recipe.draws import RngOf, drawn
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.recipe.world.motion import MotionEntry, Motions, has_clip, listed
 from viewsphere.validation.errors import one_of, read_options
-
-if TYPE_CHECKING:
-    from viewsphere.composing.motion import Move
 
 T = TypeVar("T")
 

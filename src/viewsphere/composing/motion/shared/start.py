@@ -73,3 +73,9 @@ class Start:
     def playing(self, timeline: Timeline | None, field: str) -> Start:
         """The start for a thing whose file has this timeline, and whose motion is in this field of the recipe."""
         return replace(self, timeline=timeline, field=field)
+
+
+Move = Callable[[float, Pose], Pose | None]
+"""Returns the pose at a time, seconds from the sequence's first instant, given the thing's pose without this motion; None while
+the thing is absent. Called for any times in any order.
+"""
