@@ -90,7 +90,7 @@ def room_shot(how: str, azimuth_deg: float, roughness: float) -> tuple[Shot, dic
     instant = Instant(index=0, world_from_rig=(x, y, z, w), focus=(3.0, 1.0, 0.0))
     scene = Scene(sun=Sun(azimuth=azimuth_deg, elevation=38, strength=40), sky=Sky(strength=3.0))
     more = {"channels": ("rgb",), "engine_options": {"bounces": how}}
-    return Shot(key="room", things=things, rig=Rig.of(lens), instants=(instant,), scene=scene, **more), meshes
+    return Shot(key="room", things=things, rig=Rig.single(lens), instants=(instant,), scene=scene, **more), meshes
 
 
 def staged(how: str, azimuth_deg: float = 18.0, roughness: float = 0.8) -> RasterStage:

@@ -60,7 +60,7 @@ class Times:
     """CPU seconds by name; what is timed within another is not counted there."""
 
     def __init__(self) -> None:
-        self.of: defaultdict[str, float] = defaultdict(float)
+        self.seconds: defaultdict[str, float] = defaultdict(float)
         self._inner = [0.0]
 
     @contextmanager
@@ -71,7 +71,7 @@ class Times:
             yield
         finally:
             took = time.process_time() - begun
-            self.of[name] += took - self._inner.pop()
+            self.seconds[name] += took - self._inner.pop()
             self._inner[-1] += took
 
 
@@ -118,11 +118,11 @@ def exports(frames: int, folder: Path) -> None:
     times = Times()
     with clocks(times), times.timed("common files and digests"):
         export(folder / "out", FORMATS, output=folder / "all")
-    made, whole = sum(times.of[name] for name in FORMATS), sum(times.of.values())
+    made, whole = sum(times.seconds[name] for name in FORMATS), sum(times.seconds.values())
     print(f"\n{frames} frames, {len(FORMATS)} formats\n\n| | CPU ms a frame |\n|---|---:|")
-    for name, took in sorted(times.of.items(), key=lambda row: -row[1]):
+    for name, took in sorted(times.seconds.items(), key=lambda row: -row[1]):
         print(f"| {name} | {1000 * took / frames:.2f} |")
     print(f"| all | {1000 * whole / frames:.2f} |")
-    once = made + times.of["reading"]
+    once = made + times.seconds["reading"]
     print(f"\nall / (made + read once): {whole / once:.3f}; all / made: {whole / made:.3f}")
     print(f"most memory: {resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024:.0f} MB")

@@ -94,7 +94,7 @@ class World:
     stage: Stage
 
     @staticmethod
-    def of(recipe: Recipe, stages: Stages) -> World:
+    def from_recipe(recipe: Recipe, stages: Stages) -> World:
         """That of a recipe's first sequence."""
         shot = next(plan(recipe).shots(stages.box))
         return World(shot, stages, stages.stage(shot))
@@ -113,7 +113,7 @@ class World:
     def watched(self, names: Sequence[str]) -> World:
         """The same, with other channels."""
         shot = self.shot.model_copy(update={"channels": tuple(names)})
-        return World(shot, self.stages, self.stage.of(shot))
+        return World(shot, self.stages, self.stage.for_shot(shot))
 
     def standing(self, names: Sequence[str]) -> World:
         """Still pictures by the same cameras, of the world as it is half way."""
@@ -227,10 +227,10 @@ def motion(folder: Path) -> None:
     followed = {"channels": ["tracks"], "tracks": {"count": POINTS, "on": "objects", "at": [0]}}
     stages = Stages()
     pair = {"rig": {"kind": "stereo", "baseline": 0.2}, "channels": list(PLAIN)}
-    table("Car, channels", channels(World.of(car_recipe(folder, FRAMES, **pair), stages)))
-    table("Car, tracks", tracks(World.of(car_recipe(folder, TRACKED, **followed), stages), 20.0, False))
-    town = World.of(town_recipe(FRAMES), stages)
+    table("Car, channels", channels(World.from_recipe(car_recipe(folder, FRAMES, **pair), stages)))
+    table("Car, tracks", tracks(World.from_recipe(car_recipe(folder, TRACKED, **followed), stages), 20.0, False))
+    town = World.from_recipe(town_recipe(FRAMES), stages)
     print(f"\nTown: {len(town.stage.at(0).triangles):,} triangles")
     table("Town, channels", channels(town))
     table("Town, a stereo pair", pictures(town))
-    table("Town, tracks", tracks(World.of(town_recipe(TRACKED, **followed), stages), 3.0, True))
+    table("Town, tracks", tracks(World.from_recipe(town_recipe(TRACKED, **followed), stages), 3.0, True))

@@ -86,7 +86,7 @@ def frame_cost(mesh: Mesh, side: tuple[int, int] = (640, 480), copies: int = 1) 
     shot = Shot(
         key="scaling",
         things=tuple(Thing(id=i, model=spec, motion=Motion.still(w)) for i, w in enumerate(rows, 1)),
-        rig=Rig.of(Intrinsics(width=width, height=height, fx=1.2 * width, fy=1.2 * width, cx=width / 2, cy=height / 2)),
+        rig=Rig.single(Intrinsics(width=width, height=height, fx=1.2 * width, fy=1.2 * width, cx=width / 2, cy=height / 2)),
         scene=Scene(sun=Sun(), ground=Ground()),
         instants=tuple(looking(p, (0.0, 0.0, 0.5), index=p.index) for p in poses),
         channels=("rgb", "depth", "instances", "normals"),

@@ -166,7 +166,7 @@ def shot_of(case: Case) -> tuple[Shot, dict[str, Mesh]]:
     pose = Viewpoint(index=0, azimuth_deg=case.azimuth_deg, elevation_deg=case.elevation_deg, distance=case.distance)
     lens = Intrinsics(width=WIDTH, height=HEIGHT, fx=WIDTH * 1.25, fy=WIDTH * 1.25, cx=WIDTH / 2, cy=HEIGHT / 2)
     instant = looking(pose, (x, y, z), index=0)
-    shot = Shot(key=case.name, things=things, rig=Rig.of(lens), instants=(instant,), scene=case.scene, channels=("rgb",))
+    shot = Shot(key=case.name, things=things, rig=Rig.single(lens), instants=(instant,), scene=case.scene, channels=("rgb",))
     return shot, meshes
 
 

@@ -151,7 +151,7 @@ def main() -> None:
         from viewsphere import Recipe
 
         kind, text = args.run
-        recipe = Recipe.of(text) if text.endswith(".yaml") else Recipe.model_validate({**PLAIN, **json.loads(text)})
+        recipe = Recipe.ensure(text) if text.endswith(".yaml") else Recipe.model_validate({**PLAIN, **json.loads(text)})
         with recipe.located():
             print(json.dumps({"tiny": tiny, "small": small}[kind](recipe)))
         return

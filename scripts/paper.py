@@ -327,7 +327,7 @@ def pose_sphere(made_of: Recipe, size: int) -> Picture:
     shot = Shot(
         key="sphere",
         things=(Thing(id=1, model=spec),),
-        rig=Rig.of(lens),
+        rig=Rig.single(lens),
         scene=Scene(finish=Finish(background=Background(color=(1.0, 1.0, 1.0)))),
         instants=(looking(pose, (x, y, z), index=0),),
         channels=("rgb", "depth", "instances"),

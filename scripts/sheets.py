@@ -97,7 +97,7 @@ def tile(mesh: Mesh, scene: Scene, azimuth_deg: float = 35, elevation_deg: float
     x, y, z = mesh.bounds.mean(axis=0).tolist()
     instants = (looking(pose, (x, y, z), index=0),)
     thing = Thing(id=1, model=SPEC)
-    shot = Shot(key="sheet", things=(thing,), rig=Rig.of(LENS), instants=instants, scene=scene, channels=("rgb",))
+    shot = Shot(key="sheet", things=(thing,), rig=Rig.single(LENS), instants=instants, scene=scene, channels=("rgb",))
     engine = plugins.load(EngineSpec, "raster")
     stage = engine.stage(shot, lambda spec: mesh)
     return Image.fromarray(stage.paint(0, 0, rasterize(stage.at(0), shot.camera(0)), ("rgb",))["rgb"])

@@ -108,7 +108,7 @@ def shots(several: bool, channels: tuple[str, ...], intrinsics: Intrinsics, grou
         instants = (looking(p, (0, 0, 0), index=first + p.index, split=split) for p, split in zip(POSES, splits, strict=True))
         made.append(
             Shot(
-                key=f"{names[s]}-000000", things=placed(offsets), rig=Rig.of(intrinsics), channels=channels, first=first,
+                key=f"{names[s]}-000000", things=placed(offsets), rig=Rig.single(intrinsics), channels=channels, first=first,
                 instants=tuple(instants),
                 scene=Scene(ground=Ground() if ground else None), files=files, **more,
             )

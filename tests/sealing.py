@@ -12,7 +12,7 @@ def seal_again(root: Path) -> None:
     for file in Path(root).glob(f"*/{CHECKSUMS}"):
         write_checksums(file.parent)
     for file in Path(root).glob(f"store/**/{MANIFEST}"):
-        Manifest(Manifest.of(file.parent).files, _spans(file)).write(file.parent)
+        Manifest(Manifest.from_folder(file.parent).files, _spans(file)).write(file.parent)
 
 
 def _spans(file: Path) -> dict[str, Span]:

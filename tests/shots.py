@@ -24,7 +24,7 @@ def still_shot(things, lens=SMALL, viewpoints=(AHEAD,), focus=(0, 0, 0), split="
     """A shot from these viewpoints, which look at `focus` unless they have targets of their own."""
     more = {"key": "shot", "scene": Scene(), "channels": ("rgb",)} | more
     instants = (looking(v, tuple(focus), index=v.index, split=split, finish=finish) for v in viewpoints)
-    return Shot(things=tuple(things), rig=Rig.of(lens), instants=tuple(instants), **more)
+    return Shot(things=tuple(things), rig=Rig.single(lens), instants=tuple(instants), **more)
 
 
 def camera_of(lens: Intrinsics, viewpoint: Viewpoint, focus=(0, 0, 0)) -> Camera:
@@ -36,11 +36,11 @@ def with_camera(shot: Shot, camera: Camera, finish: Finish | None = None) -> Sho
     first = shot.instants[0]
     rows = np.column_stack([camera.R.T, camera.center]).tolist()
     now = Instant(index=0, world_from_rig=(*map(tuple, rows), IDENTITY[3]), focus=first.focus, finish=finish or first.finish)
-    return shot.model_copy(update={"rig": Rig.of(camera.intrinsics), "instants": (now,)})
+    return shot.model_copy(update={"rig": Rig.single(camera.intrinsics), "instants": (now,)})
 
 
 def painted(stage, camera: Camera, finish: Finish | None = None, transparent: bool = False) -> np.ndarray:
     """What a camera sees on a stage of any engine."""
-    own = stage.of(with_camera(stage.shot, camera, finish))
+    own = stage.for_shot(with_camera(stage.shot, camera, finish))
     name = "rgba" if transparent else "rgb"
     return own.paint(0, 0, rasterize(own.at(0), own.shot.camera(0)), (name,))[name]

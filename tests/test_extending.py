@@ -134,11 +134,11 @@ def test_a_label_of_pixels_is_one_file(labelled, tmp_path):
 ASPECT = """
 from viewsphere.labels import Field, ObjectLabel
 
-def of(placement):
+def fields(placement):
     low, high = placement.box.min(axis=0), placement.box.max(axis=0)
     return {"aspect": float((high - low)[2] / (high - low)[0])}
 
-LABEL = ObjectLabel.from_placement(of, name="aspect", meaning="how tall", fields=(Field("aspect", "height over width", float),))
+LABEL = ObjectLabel.from_placement(fields, name="aspect", meaning="how tall", fields=(Field("aspect", "height over width", float),))
 """
 
 
@@ -313,7 +313,7 @@ def test_an_engine_whose_program_does_not_exist_is_refused_by_name(install):
 
 def test_a_stage_that_lacks_a_method_is_refused_by_name(install):
     install("engines", "flat", EXAMPLES["flat"].replace("def paint(", "def color("))
-    with pytest.raises(PluginError, match=r"EngineSpec\.stage: expected a stage with at, paint, of; found no paint"):
+    with pytest.raises(PluginError, match=r"EngineSpec\.stage: expected a stage with at, paint, for_shot; found no paint"):
         next(iter(render(small_recipe(engine="flat", formats=[]))))
 
 

@@ -114,7 +114,7 @@ def test_labels_that_were_sealed_again_are_rendered_again(small_run, spoilt):
     records = json.loads(file.read_text())
     records[0]["objects"][0]["visibility"][0] /= 2
     file.write_text(json.dumps(records))
-    Manifest.of(file.parent).write(file.parent)
+    Manifest.from_folder(file.parent).write(file.parent)
     found = repair(spoilt, rays=False)
     assert found.report.ok, found.report.findings
     assert found.done == (

@@ -377,7 +377,7 @@ def test_an_old_processor_is_named_where_kernels_are_compiled(monkeypatch, capsy
     from viewsphere.kernels import build
     from viewsphere.run.progress import Progress
 
-    monkeypatch.setattr(build, "TARGET", build.Target.of(build.TRIPLE, "ivybridge", {"avx": True}, native=False))
+    monkeypatch.setattr(build, "TARGET", build.Target.for_machine(build.TRIPLE, "ivybridge", {"avx": True}, native=False))
     with ProgressBar(quiet=False) as bar:
         for done in range(3):
             bar.show(Progress("kernels", done, 2))

@@ -21,7 +21,7 @@ OBJECT_FROM_GLTF = np.array([[1, 0, 0], [0, 0, -1], [0, 1, 0]])
 
 @pytest.fixture(scope="module")
 def model():
-    return DeformingMesh.of({frame: walker(frame) for frame in reversed(FRAMES)})
+    return DeformingMesh.from_meshes({frame: walker(frame) for frame in reversed(FRAMES)})
 
 
 @pytest.fixture(scope="module")
@@ -146,7 +146,9 @@ def test_a_time_step_that_is_not_there_is_said(folder):
 
 
 def test_equal_models_give_equal_bytes(model, folder, tmp_path):
-    export_deforming(DeformingMesh.of({frame: walker(frame) for frame in FRAMES}), tmp_path / "walker", "walker", SECONDS)
+    export_deforming(
+        DeformingMesh.from_meshes({frame: walker(frame) for frame in FRAMES}), tmp_path / "walker", "walker", SECONDS
+    )
     assert {p.name: p.read_bytes() for p in folder.iterdir()} == {
         p.name: p.read_bytes() for p in (tmp_path / "walker").iterdir()
     }

@@ -68,7 +68,7 @@ def test_parts_stay_with_their_triangles(tmp_path):
         middle = one.vertices[one.triangles].mean(axis=1)[:, 2]
         np.testing.assert_array_equal(one.triangle_body_part, 1 + (middle > 1))
     bent = load(spec_of(other), folder=tmp_path / "cache")[0]
-    export_deforming(DeformingMesh.of({1: mesh, 2: bent}), tmp_path, "arms", {1: 0.0, 2: 1.0})
+    export_deforming(DeformingMesh.from_meshes({1: mesh, 2: bent}), tmp_path, "arms", {1: 0.0, 2: 1.0})
     read = read_exported(tmp_path / "arms.glb", bent.parts, "arms-f0002")
     np.testing.assert_array_equal(read.triangle_body_part, bent.triangle_body_part)
     assert mesh.emptied().triangle_body_part.size == 0 and material_names(tmp_path / "arm.glb") == ("clay",)

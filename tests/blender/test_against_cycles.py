@@ -155,7 +155,7 @@ def test_models_are_those_of_the_objects_that_a_sample_has():
     """A sample of a sequence lacks the objects that are not there, so its objects are known by their numbers."""
     first, second = (Thing(id=i, model=spec(f"model_{i}")) for i in (1, 2))
     seen = SimpleNamespace(id=2, key="kept_2", track="")
-    models = StoredModels.of(None, SimpleNamespace(objects=(first, second)), SimpleNamespace(objects=(seen,)))
+    models = StoredModels.for_sample(None, SimpleNamespace(objects=(first, second)), SimpleNamespace(objects=(seen,)))
     assert models.keys == {(second.model, None): ("kept_2", "kept_2")}
 
 

@@ -141,7 +141,7 @@ def met_by_cycles(recipe):
         truth = rasterize(stage.geometry, camera).triangle
         process = stage.keeper.process_for(stage)
         out = process.folder / "asked.npy"
-        told = FileFrame.of(shot.scene.blend).camera(camera_request(camera))
+        told = FileFrame.from_blend(shot.scene.blend).camera(camera_request(camera))
         process.ask("render", camera=told, transparent=False, border=None, passes=["index"], out=str(out))
         seen = np.load(out.with_suffix(".index.npy"))[..., 0].astype(int)
         index = {p.id: INDEX.get(p.model.category, p.id) for p in shot.objects}

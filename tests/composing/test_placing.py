@@ -178,7 +178,7 @@ def test_a_map_leaves_out_crowded_spots_alone(measures, own, gap, of_hulls, seed
     width, length, x = own
     shape = box(width, length, x=x)
     cover = partial(outline if of_hulls else footprint, shape)
-    others = Others((TakenMap.of(gap, inner_class(cover(IDENTITY).circle.inner), 20.0),))
+    others = Others((TakenMap.empty(gap, inner_class(cover(IDENTITY).circle.inner), 20.0),))
     for w, n, *at in measures:
         others.add((outline if of_hulls else footprint)(box(w, n), standing(box(w, n), *at)))
     draws = np.random.default_rng(seed).random((60, 3))

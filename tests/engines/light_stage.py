@@ -76,7 +76,7 @@ class LightStage:
             self.origin, self.unit = np.zeros(3), 2.0 ** np.ceil(np.log2(np.abs(scenery.vertices).max()))
         lengths = Lengths(tuple(self.origin.tolist()), float(self.unit))
         materials = pack_materials(everything, None, lengths, len(meshes))
-        rows = Rows.of(self.geometry, everything, materials, lengths)
+        rows = Rows.from_geometry(self.geometry, everything, materials, lengths)
         rows.write(range(len(everything)))
         self.surfaces, self.textures = rows.surfaces, materials.textures
         low, high, floor = (low - self.origin) / self.unit, (high - self.origin) / self.unit, None

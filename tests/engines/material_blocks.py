@@ -47,7 +47,7 @@ def packed(mesh: Mesh, ground: Ground | None = None, repaints=()):
     geometry = build_geometry((thing,), (mesh,), ground is not None, 0.01)
     metres = Lengths((0.0, 0.0, 0.0), 1.0)
     materials = pack_materials((mesh,), ground, metres, 1, (thing,))
-    rows = Rows.of(geometry, (mesh,), materials, metres)
+    rows = Rows.from_geometry(geometry, (mesh,), materials, metres)
     rows.write([0])
     return rows.surfaces, materials.textures
 

@@ -49,7 +49,7 @@ def test_it_looks_as_on_raster(engine, scene, blender):
     change = blurred - one
     area = np.abs(change).max(axis=-1) > 8
     assert area.mean() > 0.05
-    after = painted(stage.of(small(sharp(shot), engine)))
+    after = painted(stage.for_shot(small(sharp(shot), engine)))
     share = ((found - after) * change)[area].sum() / (change**2)[area].sum()
     assert 0.8 < share < 1.2, share
     assert np.abs(found - blurred)[area].mean() < 0.6 * np.abs(change)[area].mean()

@@ -152,7 +152,7 @@ def test_the_ground_fades_where_blender_is_told_to():
     shot = shot_of({"name": "workbench"}, scene={"ground": "on"})
     geometry, meshes = geometry_of(shot)
     told = scene_request(shot.things, meshes, geometry, shot.scene, options_of("workbench", {}), lambda array: "array")
-    fading, backdrop = told["ground"]["fading"], Backdrop.of(shot, geometry)
+    fading, backdrop = told["ground"]["fading"], Backdrop.for_shot(shot, geometry)
     camera = moved_camera(shot, backdrop.middle - shot.instants[0].focus)
     before = np.linalg.norm(backdrop.middle - camera.center)
 
@@ -177,7 +177,7 @@ def test_the_sky_behind_is_rasters(scene):
     geometry, _ = geometry_of(shot)
     visibility = rasterize(geometry, raster.camera)
     nothing = np.zeros((96, 96, 4), np.float32)
-    backdrop = Backdrop.of(shot, geometry)
+    backdrop = Backdrop.for_shot(shot, geometry)
     behind = backdrop.behind(nothing, raster.camera, visibility, False)
     assert np.array_equal(behind[..., 3], np.ones((96, 96)))
     picture = finished(behind, None, shot.scene.finish, lambda: None)
@@ -193,7 +193,7 @@ def test_the_ground_fades_and_what_stands_before_it_does_not():
     pose = shot.instants[0].viewpoint.model_copy(update={"elevation_deg": 6})
     camera = camera_of(shot.rig.sensors[0].intrinsics, pose, (0.0, 0.0, 0.05))
     visibility = rasterize(geometry, camera)
-    left = Backdrop.of(shot, geometry).behind(np.ones((96, 96, 4), np.float32), camera, visibility, True)[..., 3]
+    left = Backdrop.for_shot(shot, geometry).behind(np.ones((96, 96, 4), np.float32), camera, visibility, True)[..., 3]
     is_object = (visibility.triangle >= 0) & (geometry.triangle_object[visibility.triangle] > 0)
     is_ground = (visibility.triangle >= 0) & ~is_object
     assert (left[is_object] == 1).all()

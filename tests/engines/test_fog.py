@@ -49,7 +49,7 @@ def test_a_plate_at_a_known_range_is_veiled_as_koschmieder_says():
 
 
 def test_at_the_visibility_two_percent_of_the_contrast_are_left():
-    air = Air.of(THICK, VIEW, np.array([[0.0, 0.0, 1.0]]))
+    air = Air.for_camera(THICK, VIEW, np.array([[0.0, 0.0, 1.0]]))
     assert math.exp(-float(air.depth(np.array([1 / 20], np.float32))[0])) == pytest.approx(0.02, rel=1e-3)
 
 
@@ -146,14 +146,16 @@ def test_ground_fog_is_the_integral_of_its_density(elevation, away):
     view = type(view)(view.intrinsics, np.eye(3)[[0, 2, 1]] * [[1], [-1], [1]], np.array([0, eye, 0.0]))
     assert view.center[2] == pytest.approx(eye)
     ray = np.array([[0.0, -math.sin(e), math.cos(e)]])
-    found = float(Air.of(fog, view, ray).depth(np.array([1 / away], np.float32))[0])
+    found = float(Air.for_camera(fog, view, ray).depth(np.array([1 / away], np.float32))[0])
     s = np.linspace(0, away, 200_001)
     density = fog.extinction * np.exp(-(eye + s * math.sin(e)) / 5.0)
     assert found == pytest.approx(min(float(np.trapezoid(density, s)), 80.0), rel=1e-4)
 
 
 def test_above_ground_fog_the_sky_is_seen():
-    found = float(Air.of(Fog(visibility=60, height=5.0), VIEW, np.array([[0, 0, -1.0]])).depth(np.zeros(1, np.float32))[0])
+    found = float(
+        Air.for_camera(Fog(visibility=60, height=5.0), VIEW, np.array([[0, 0, -1.0]])).depth(np.zeros(1, np.float32))[0]
+    )
     assert found == pytest.approx(CONTRAST / 60 * 5 * math.exp(-7 / 5), rel=1e-5)
 
 

@@ -140,7 +140,7 @@ def test_between_smooth_and_rough_less_and_less_of_the_ray_counts():
 def test_a_picture_is_the_same_beside_passes_of_its_light():
     """And a picture of the stage has what panes mirror."""
     stage = stage_of(AWAY, Scene(sun=sun(), sky=DARK), painted_mesh(plate(), *behind()))
-    own = stage.of(with_camera(stage.shot, VIEW))
+    own = stage.for_shot(with_camera(stage.shot, VIEW))
     seen = rasterize(own.at(0), VIEW)
     alone, beside = (own.paint(0, 0, seen, names)["rgb"].astype(int) for names in (("rgb",), ("rgb", "albedo", "residual")))
     assert np.abs(alone - beside).max() <= 1

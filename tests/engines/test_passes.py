@@ -34,7 +34,7 @@ SUN = Sun(azimuth=60, elevation=40, strength=2.0, color=(1.0, 0.7, 0.4), angle_d
 
 
 def passes(stage, view, names=ALL, finish=None):
-    own = stage.of(with_camera(stage.shot, view, finish))
+    own = stage.for_shot(with_camera(stage.shot, view, finish))
     return own.paint(0, 0, rasterize(own.at(0), own.shot.camera(0)), names)
 
 
@@ -149,7 +149,7 @@ def test_albedo_times_shading_and_the_rest_is_the_picture(where, catcher):
         camera(120, 90, 110, 25, 20, 3.2, (0, 0, 0.4)),
         Finish(background=background, view=ViewTransform(transform="agx")),
     )
-    own = stage.of(with_camera(stage.shot, view, finish))
+    own = stage.for_shot(with_camera(stage.shot, view, finish))
     seen = rasterize(own.at(0), own.shot.camera(0))
     alone = own.paint(0, 0, seen, (name,))
     found = own.paint(0, 0, seen, (name, *ALL))

@@ -94,7 +94,7 @@ def test_an_instant_looks_as_if_it_were_built_alone(scene, has_scenery, moves):
         part = stage_of(cut(shot, first, stop))
         for i in range(first, stop):
             assert np.array_equal(picture(part, i - first), alone[i]), i
-    again = stage.of(shot)
+    again = stage.for_shot(shot)
     assert np.array_equal(picture(again, 3), alone[3])
 
 
@@ -133,7 +133,7 @@ def test_a_sequence_looks_like_stills(scene, occlusion, most, share):
 def test_a_stage_tells_stills_from_a_sequence():
     stage = stage_of(sequence_of("sun"))
     moving = picture(stage, 1)
-    still = stage.of(sequence_of("sun", sequence=""))
+    still = stage.for_shot(sequence_of("sun", sequence=""))
     assert np.array_equal(picture(still, 1), picture(stage_of(still.shot), 1))
     assert np.array_equal(picture(stage, 1), moving)
 
@@ -177,7 +177,7 @@ def test_what_is_in_no_picture_has_no_rows_but_casts_shadows():
 
 def test_few_maps_are_kept():
     rows = stage_of(sequence_of("sun")).baked(0).rows
-    maps = StillMaps.of(rows.part, 1, (), 1)
+    maps = StillMaps.for_things(rows.part, 1, (), 1)
     for i in range(3 * MOST):
         maps.keep((b"", float(i), 0.0, 4), np.full((4, 20), i, np.float32))
     assert maps.begun((b"", 0.0, 0.0, 4)) is None

@@ -65,7 +65,7 @@ def test_parts_of_light_are_means_of_those_of_finer_pixels():
 
     def parts_of(view, antialias):
         stage = stage_of(mesh, scene, antialias=antialias)
-        stage = stage.of(with_camera(stage.shot, view, None))
+        stage = stage.for_shot(with_camera(stage.shot, view, None))
         return stage.paint(0, 0, rasterize(stage.at(0), view), (*LIGHT_PASSES, "rgb"))
 
     found, fine = parts_of(view, 16), parts_of(larger(view, 2), 4)

@@ -150,7 +150,7 @@ def test_before_a_black_wall_a_film_leaves_the_light_that_the_ground_scatters():
     place = painted_mesh((rectangle((-60, -60, 0), (120, 0, 0), (0, 63, 0)), floor), wall)
     small = mesh_of(box((5, 5, 0), (5.2, 5.2, 0.2)), matt(0.5))
     stage = bounced_stage(small, Scene(sun=None, sky=EVEN, finish=OUT), place, bounces="off", antialias=1)
-    stage = stage.of(with_camera(stage.shot, view))
+    stage = stage.for_shot(with_camera(stage.shot, view))
     seen, radiance = rasterize(stage.at(0), view), np.empty((view.width * view.height, 4), np.float32)
     passes = stage.paint(0, 0, seen, ("albedo", "shading"))
 

@@ -29,7 +29,7 @@ EMPTY = {"depth": np.inf, "depth_ray": np.inf, "instances": 0, "categories": 0, 
 
 def files(tree, sample):
     """The whole files that a tree makes of a sample: bytes by their paths, and the stored files' own paths."""
-    return {one.path: content(one.content) for one in tree.of(sample) if isinstance(one, File)}
+    return {one.path: content(one.content) for one in tree.sample_files(sample) if isinstance(one, File)}
 
 
 def content(made):

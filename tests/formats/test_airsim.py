@@ -30,7 +30,7 @@ def both(request, tmp_path_factory):
     kinds = [kind for kind in KINDS if request.param == "videos" or kind != "disparity_normalized"]
     place = tmp_path_factory.mktemp("airsim")
     export(dataset.root, [{"airsim": {"images": kinds}}], output=place)
-    return Views(dataset).of(FormatEntry(name="airsim", options={"images": kinds}), None), place / "airsim", kinds
+    return Views(dataset).for_format(FormatEntry(name="airsim", options={"images": kinds}), None), place / "airsim", kinds
 
 
 def pfm(file):

@@ -252,7 +252,7 @@ def test_the_rig_stands_where_the_camera_does(elevation, tilt, tmp_path):
     target = np.array([0.3, -2.0, 1.0])
     center = target + orbit_center(*angles[:2], sample.pose.distance)
     camera = type(sample.camera)(sample.camera.intrinsics, rotation, -rotation @ center)
-    (pose,) = saving._poses_request([type(sample)(**{**vars(sample), "known_camera": camera})], FileFrame.of(None))
+    (pose,) = saving._poses_request([type(sample)(**{**vars(sample), "known_camera": camera})], FileFrame.from_blend(None))
     np.testing.assert_allclose(pose["target"], target, atol=1e-12)
     x, z, roll = np.radians([90 - pose["elevation"], pose["azimuth"], -pose["tilt"]])
     turn = _about("z", z) @ _about("x", x)

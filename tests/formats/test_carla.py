@@ -106,7 +106,7 @@ def test_all_tags():
 def test_nothing_but_sky(stills):
     empty = {"depth": np.full((2, 2), np.inf, np.float32), "semantic": np.ones((2, 2), np.int32)}
     empty |= {"instances": np.zeros((2, 2), np.int32), "rgb": np.zeros((2, 2, 3), np.uint8)}
-    files = list(Carla(stills).of(replace(stills[0], objects=(), channels=empty, files={})))
+    files = list(Carla(stills).sample_files(replace(stills[0], objects=(), channels=empty, files={})))
     decoded = {one.path.split("/")[2]: one.content for one in files[:-1]}
     assert decoded["bounding_boxes"] == b"[]\n"
     depth = cv2.imdecode(np.frombuffer(decoded["depth"].make(), np.uint8), cv2.IMREAD_UNCHANGED)
@@ -118,5 +118,5 @@ def test_what_it_refuses(stills):
     assert list(refuses(scope)) == []
     lens = Intrinsics(width=4, height=4, fx=1, fy=1, cx=2.5, cy=2)
     told = "expected square pixels and a principal point in the picture's middle; found others of camera"
-    assert list(refuses(replace(scope, rig=Rig.of(lens)))) == [told]
+    assert list(refuses(replace(scope, rig=Rig.single(lens)))) == [told]
     assert list(refuses(replace(scope, most_objects=70000))) == ["expected at most 65,535 objects in a picture; found 70,000"]

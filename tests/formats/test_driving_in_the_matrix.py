@@ -61,9 +61,9 @@ def test_lists_and_flags(stills, written):
 def test_odd_names_and_empty_pictures(stills):
     tree = Matrix(stills, Options())
     odd = replace(stills[0], objects=(replace(stills[0].objects[0], category="Bäume <'&\"> x"),))
-    xml = next(one for one in tree.of(odd) if one.path.endswith(".xml")).content
+    xml = next(one for one in tree.sample_files(odd) if one.path.endswith(".xml")).content
     assert ElementTree.fromstring(xml).find("object").findtext("name") == "bäume <'&\"> x"
-    xml = next(one for one in tree.of(replace(odd, objects=())) if one.path.endswith(".xml")).content
+    xml = next(one for one in tree.sample_files(replace(odd, objects=())) if one.path.endswith(".xml")).content
     assert ElementTree.fromstring(xml).find("object") is None
 
 

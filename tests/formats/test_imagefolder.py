@@ -155,4 +155,4 @@ def test_objects_without_a_pose_have_no_pose_category(poses):
     sample = poses[0]
     unknown = replace(sample, objects=tuple(replace(o, pose_category="") for o in sample.objects))
     with pytest.raises(UserError, match=r"imagefolder: expected the pose_category of object 1; found none .frame 0."):
-        list(ImageFolder(poses, Options(by="pose_category")).of(unknown))
+        list(ImageFolder(poses, Options(by="pose_category")).sample_files(unknown))

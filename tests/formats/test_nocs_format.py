@@ -180,4 +180,4 @@ def test_what_it_refuses(stills, tmp_path):
         "expected at most 254 objects in a picture; found 255"
     ]
     with pytest.raises(UserError, match="nocs: expected channel nocs; found none of frame 0"):
-        list(Nocs(stills).of(replace(stills[0], channels={"rgb": stills[0].rgb})))
+        list(Nocs(stills).sample_files(replace(stills[0], channels={"rgb": stills[0].rgb})))

@@ -144,7 +144,7 @@ def test_objects_whose_place_is_not_known(stills):
     sample = stills[0]
     nowhere = np.full((4, 4), np.nan)
     lost = replace(sample, objects=tuple(replace(o, world_from_object=nowhere, visibility=np.nan) for o in sample.objects))
-    _, _, *pieces = Omni3d(stills).of(lost)
+    _, _, *pieces = Omni3d(stills).sample_files(lost)
     for piece, o in zip(pieces, sample.objects, strict=True):
         one = json.loads(piece.data)
         assert not one["valid3D"] and one["visibility"] == -1 and one["bbox2D_tight"] == list(o.box2d)

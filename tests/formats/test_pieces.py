@@ -8,7 +8,7 @@ from viewsphere.formats.shared.writing.tree import Piece, Tree, functions
 class Mixed(Tree):
     """Two files of two sections each, whose second ones begin when both files are there."""
 
-    def of(self, sample):
+    def sample_files(self, sample):
         for section in "xy":
             for path in ("a.txt", "b.txt"):
                 yield Piece(path, f"{path} {section} {sample}\n".encode(), section)

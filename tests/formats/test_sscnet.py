@@ -88,7 +88,7 @@ def test_depth_and_cells(both):
 
 def made(dataset, runs):
     sample = replace(dataset[0], channels={**dataset[0].channels, "voxels": runs}, files={})
-    return next(one for one in Sscnet(dataset).of(sample) if one.path.endswith(".bin")).content.make()
+    return next(one for one in Sscnet(dataset).sample_files(sample) if one.path.endswith(".bin")).content.make()
 
 
 def test_rooms(both, tmp_path):
@@ -113,6 +113,6 @@ def test_what_it_refuses(both, drives):
     sample = replace(dataset[0], options={"voxels": {"size": (24, 14, 24), "cell": 0.2}})
     told = "sscnet: expected voxels of 240 x 144 x 240 cells of 0.02 m; found 24 x 14 x 24 of 0.2 m"
     with pytest.raises(UserError, match=re.escape(told)):
-        list(Sscnet(dataset).of(sample))
+        list(Sscnet(dataset).sample_files(sample))
     (told,) = Sscnet(dataset).notes()
     assert told.endswith("these have 160 x 120 and 171.561")

@@ -377,7 +377,7 @@ def first_of(dataset, change):
     tree = surreal.Surreal(dataset)
     samples = [change(sample) for sample in dataset.sequence(dataset.sequences[0])]
     tree._sequence = lambda name, sensor: tuple(samples)
-    return list(tree.of(samples[0]))
+    return list(tree.sample_files(samples[0]))
 
 
 def moved_on(sample):
@@ -424,9 +424,9 @@ def test_parts_that_have_no_number_are_told_where_they_are_seen(people):
     tree = surreal.Surreal(people)
     tree._models = {key: replace(info, body_parts=("tail", *info.body_parts[1:])) for key, info in tree._models.items()}
     with pytest.raises(UserError, match=r"frame 0: model walker-f\d+: expected bones of SURREAL's 24 parts .* found tail: let"):
-        list(tree.of(people[0]))
+        list(tree.sample_files(people[0]))
     hidden = with_channels(people[0], body_parts=np.zeros_like(people[0].body_parts))
-    assert list(tree.of(hidden))
+    assert list(tree.sample_files(hidden))
 
 
 def test_without_the_extras(monkeypatch):

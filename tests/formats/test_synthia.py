@@ -119,7 +119,7 @@ def test_two_lenses_in_a_sequence_are_an_error(videos):
 
 def test_four_sides(videos):
     tree = Synthia(videos, Options(layout="seqs"))
-    paths = [one.path for one in tree.of(replace(videos[0], sensor="right_B"))]
+    paths = [one.path for one in tree.sample_files(replace(videos[0], sensor="right_B"))]
     assert any("/Stereo_Right/Omni_B/000000.png" in path for path in paths)
 
 
@@ -144,5 +144,5 @@ def test_what_it_refuses(stills, videos):
 
 def test_a_picture_without_objects(stills):
     sample = replace(stills[0], objects=(), channels={**stills[0].channels, "semantic": np.full((120, 160), 1, np.int32)})
-    files = {one.path: one for one in Synthia(stills, Options()).of(sample)}
+    files = {one.path: one for one in Synthia(stills, Options()).sample_files(sample)}
     assert set(files["GTTXT/0000000.txt"].content.make().split()) == {b"1"}

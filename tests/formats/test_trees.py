@@ -55,7 +55,7 @@ def accepts(dataset, name):
 
 def remarks(dataset, name, folder):
     entry = FormatEntry(name=name)
-    view = Views(chosen(dataset, name)).of(entry, None)
+    view = Views(chosen(dataset, name)).for_format(entry, None)
     return list(plugins.load(FormatSpec, name).verify(view, folder, range(len(view)), *entry.arguments()))
 
 

@@ -128,7 +128,7 @@ def test_frames_of_several_splits_are_an_error(lone, monkeypatch):
 
 def test_a_picture_without_objects(lone):
     sample = replace(lone[0], objects=())
-    assert {one.path.split("/")[1] for one in Viper(lone).of(sample)} == {"img", "cls", "inst", "flow", "camera"}
+    assert {one.path.split("/")[1] for one in Viper(lone).sample_files(sample)} == {"img", "cls", "inst", "flow", "camera"}
 
 
 def test_what_it_refuses(stills, videos, lone):

@@ -109,7 +109,7 @@ def corners(size, place, turns):
 
 @pytest.mark.slow
 def test_maps_of_version_2(videos, two):
-    for sample in Views(videos).of(FormatEntry(name="vkitti"), None):
+    for sample in Views(videos).for_format(FormatEntry(name="vkitti"), None):
         camera, root = int(sample.sensor == "right"), two / f"Scene{sample.sequence}/fog/frames"
 
         def file(kind, name, root=root, tail=f"{sample.instant:05d}", camera=camera):
@@ -237,7 +237,7 @@ def test_frames_without_objects_have_texts_all_the_same(videos):
 
 
 def test_colors_tell_all_apart(videos):
-    names = Names.of(videos.classes)
+    names = Names.from_classes(videos.classes)
     colors = {tuple(color) for color in object_colors()[1:].tolist()}
     assert len(colors) == 255 and not colors & set(names.colors.values())
     assert len(set(COLORS.values())) == len(COLORS)
@@ -257,4 +257,4 @@ def test_what_it_refuses(stills, videos):
     many = replace(scope, most_objects=256)
     assert list(refuses(many, new)) == ["expected at most 255 objects in a picture; found 256"]
     lens = Intrinsics(width=4, height=4, fx=1, fy=1, cx=2, cy=2, skew=0.5)
-    assert list(refuses(replace(scope, rig=Rig.of(lens)), new)) == ["expected cameras without skew; found 0.5 of camera"]
+    assert list(refuses(replace(scope, rig=Rig.single(lens)), new)) == ["expected cameras without skew; found 0.5 of camera"]

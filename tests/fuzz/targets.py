@@ -620,7 +620,7 @@ def _read(root: Path) -> None:
     for sample in dataset:
         _each(lambda sample=sample: [sample.channels[name] for name in sample.channels], lambda sample=sample: sample.objects)
     _each(lambda: dataset.models, lambda: dataset.sequences, lambda: list(dataset.select("index", "objects.box2d")))
-    _each(lambda: films_of(dataset), lambda: [list(dataset.of(split)) for split in dataset.splits])
+    _each(lambda: films_of(dataset), lambda: [list(dataset.positions(split)) for split in dataset.splits])
     _each(lambda: [dataset.tracks(name, "left") for name in dataset.sequences])
 
 

@@ -226,7 +226,7 @@ def frames_of(root, pattern, change):
 def test_names_in_records_are_texts(name, tmp_path):
     root = shutil.copytree(_made(False) / "store", tmp_path / "out/store").parent
     dataset = frames_of(root, "frames.json", lambda records: records[0].update({name: []}))
-    for asked in (lambda: dataset.sequences, lambda: list(dataset.of("train"))):
+    for asked in (lambda: dataset.sequences, lambda: list(dataset.positions("train"))):
         with pytest.raises(ViewsphereError, match="that is no text"):
             asked()
 
@@ -235,7 +235,7 @@ def test_a_shot_has_as_many_samples_as_are_planned(tmp_path):
     root = shutil.copytree(_made(True) / "store", tmp_path / "out/store").parent
     dataset = frames_of(root, "shot.json", lambda shot: shot["instants"].pop())
     with pytest.raises(ViewsphereError, match="3 samples instead of 4"):
-        list(dataset.of("train"))
+        list(dataset.positions("train"))
 
 
 @pytest.mark.parametrize(

@@ -11,7 +11,7 @@ ALL = dict.fromkeys(NEEDED, True)
 
 
 def target(triple=LINUX, host="znver4", native=False, **features):
-    return Target.of(triple, host, ALL | features, native)
+    return Target.for_machine(triple, host, ALL | features, native)
 
 
 def test_processors_of_a_kind_share_one_target():
@@ -34,9 +34,9 @@ def test_a_processor_that_lacks_an_instruction_gets_its_own_code_and_says_so(nam
 
 
 def test_what_llvm_knows_nothing_of_counts_as_lacking():
-    assert Target.of(LINUX, "", {}, native=False).lacking == NEEDED
+    assert Target.for_machine(LINUX, "", {}, native=False).lacking == NEEDED
 
 
 def test_other_processors_get_code_of_their_own():
-    arm = Target.of(ARM, "neoverse-n1", {"neon": True}, native=False)
+    arm = Target.for_machine(ARM, "neoverse-n1", {"neon": True}, native=False)
     assert arm == Target("neoverse-n1", "+neon") and arm.note == ""

@@ -183,7 +183,7 @@ def test_scenery_is_surface_and_what_it_covers_is_indoors():
 
 def test_the_grid_lies_before_the_camera():
     camera = orbit_camera(lens(64, 48, 0.9), 0.7, 0.5, 3.0, 0.2)
-    grid = Grid.of(Voxels(size=(10, 8, 6), cell=0.5, distance=2.0, bottom=-0.3), camera)
+    grid = Grid.for_camera(Voxels(size=(10, 8, 6), cell=0.5, distance=2.0, bottom=-0.3), camera)
     m = grid.world_from_grid
     np.testing.assert_allclose(m[:3, :3].T @ m[:3, :3], np.eye(3), atol=1e-15)
     assert np.linalg.det(m[:3, :3]) == pytest.approx(1)
@@ -192,7 +192,7 @@ def test_the_grid_lies_before_the_camera():
     assert m[2, 3] == -0.3 and m[:3, 1].tolist() == [0, 0, 1]
     ahead = camera.R[2][:2] / np.linalg.norm(camera.R[2][:2])
     np.testing.assert_allclose(m[:2, 0], ahead)
-    turned = Grid.of(Voxels(axes="world"), camera).world_from_grid
+    turned = Grid.for_camera(Voxels(axes="world"), camera).world_from_grid
     np.testing.assert_array_equal(turned[:3, :3], [[0, 0, 1], [1, 0, 0], [0, 1, 0]])
     points = np.random.default_rng(0).normal(size=(20, 3))
     np.testing.assert_allclose(grid.points(grid.cells(points)), points, atol=1e-12)
@@ -202,7 +202,7 @@ def test_the_grid_lies_before_the_camera():
 def test_of_a_camera_that_looks_straight_down_or_up_the_picture_s_top_or_bottom_is_ahead(sign):
     turn = np.array([[0.6, 0.8, 0], [0.8 * sign, -0.6 * sign, 0], [0, 0, -sign]], float)
     assert np.linalg.det(turn) == pytest.approx(1)
-    grid = Grid.of(Voxels(), Camera(lens(8, 8), turn, np.zeros(3)))
+    grid = Grid.for_camera(Voxels(), Camera(lens(8, 8), turn, np.zeros(3)))
     np.testing.assert_allclose(grid.world_from_grid[:3, 2], (0.6, 0.8, 0), atol=1e-12)  # right is the picture's right
 
 

@@ -43,7 +43,7 @@ def moving_shot(engine="raster") -> Shot:
         looking(AHEAD.model_copy(update={"azimuth_deg": 25 + 4 * i}), (0.0, 0.0, 0.5), index=i, split="train") for i in range(4)
     )
     return Shot(
-        key="moving", things=things, rig=Rig.of(LENS), instants=instants, scene=Scene(ground=Ground()), first=40,
+        key="moving", things=things, rig=Rig.single(LENS), instants=instants, scene=Scene(ground=Ground()), first=40,
         sequence="passing", engine=engine, engine_options=OPTIONS[engine], channels=CHANNELS,
     )  # fmt: skip
 

@@ -37,7 +37,7 @@ def folder(tmp_path):
     (tmp_path / "depth").mkdir()
     for name, data in {"frames.json": b"[]", "depth/1.tiff": bytes(range(256)) * 5000, "depth/2.tiff": b""}.items():
         (tmp_path / name).write_bytes(data)
-    Manifest.of(tmp_path).write(tmp_path)
+    Manifest.from_folder(tmp_path).write(tmp_path)
     return tmp_path
 
 

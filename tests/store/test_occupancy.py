@@ -35,7 +35,7 @@ def test_a_block_fills_its_share_of_the_cube(dataset, number):
 def test_insides_are_those_of_embree_s_rays(cells):
     pytest.importorskip("embreex")
     ball = sphere(3, 0.8)
-    found = Occupancy.of(ball.vertices + np.float32(0.1), ball.triangles, cells)
+    found = Occupancy.from_mesh(ball.vertices + np.float32(0.1), ball.triangles, cells)
     mesh = trimesh.Trimesh(ball.vertices + np.float32(0.1), ball.triangles)
     centers = found.centers(np.ones((cells,) * 3, bool))
     contained = mesh.contains(centers).reshape((cells,) * 3)

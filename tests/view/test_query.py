@@ -28,7 +28,7 @@ def known(samples):
 
 def asked(known, **parameters):
     """Numbers of the frames that the server would answer with."""
-    return known.frames["number"][Query.of(parameters).answer(known)].tolist()
+    return known.frames["number"][Query.from_parameters(parameters).answer(known)].tolist()
 
 
 def value_of(sample, name, o=None):
@@ -146,4 +146,4 @@ def test_an_earlier_time_is_answered_as_it_was(known):
 )
 def test_what_cannot_be_asked(parameters, word):
     with pytest.raises(UserError, match=word):
-        Query.of(parameters)
+        Query.from_parameters(parameters)

@@ -358,7 +358,7 @@ def test_a_mistake_of_ours_is_one_line(server, capfd, monkeypatch):
     def broken(*_):
         raise KeyError("mistake")
 
-    monkeypatch.setattr(server.answers, "of", broken)
+    monkeypatch.setattr(server.answers, "answer", broken)
     assert get(server, "/state")[0] == 500
     assert capfd.readouterr().err == "viewsphere: view: KeyError: 'mistake'\n"
 

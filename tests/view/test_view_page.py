@@ -71,7 +71,7 @@ def work(session):
 
 def test_a_data_set_of_273_600_frames(serve, small_run, tmp_path, open_view, capsys):
     server = serve(large_dataset(small_run, tmp_path / "large"))
-    assert until(lambda: server.answers.of("/state", {}).body.find(f'"finished":{FRAMES}'.encode()) > 0)
+    assert until(lambda: server.answers.answer("/state", {}).body.find(f'"finished":{FRAMES}'.encode()) > 0)
     page = open_view(server.url)
     asked = []
     page.on("request", lambda request: asked.append(request.url))

@@ -128,7 +128,7 @@ def test_labels_are_read_from_left_to_right() -> None:
     ids=["bowl", "plate", "bottle", "mug"],
 )
 def test_what_is_turned_is_found_round(mesh, is_round: bool) -> None:
-    found = find(Surface.of(mesh))
+    found = find(Surface.from_mesh(mesh))
     if is_round:
         assert [c.axis for c in found.continuous] == [(0.0, 0.0, 1.0)] and not found.discrete
     else:

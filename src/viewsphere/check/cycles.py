@@ -84,7 +84,7 @@ class Compared:
         if changed:
             self._left_out[f"whose scenery is not what it was ({changed[0]})"] += 1
             return None
-        kept, load = kept_map(sample), StoredModels.of(self._dataset, now, sample)
+        kept, load = kept_map(sample), StoredModels.for_sample(self._dataset, now, sample)
         for thing in now.objects:
             if thing.is_there:
                 load(thing.model, thing.step)  # loaded here to distinguish damage from a Blender that does not answer

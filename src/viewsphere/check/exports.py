@@ -45,6 +45,6 @@ def _contents(views: Views, folder: Path, verify: Verify, sampled: Collection[in
     try:
         entry = FormatEntry(name=folder.name, options=written_options(folder))
         with here(folder) as local:
-            yield from verify(views.of(entry, written_least(folder)), local, sampled, *entry.arguments())
+            yield from verify(views.for_format(entry, written_least(folder)), local, sampled, *entry.arguments())
     except Exception as error:
         yield None, failure("an export that can be checked", error)

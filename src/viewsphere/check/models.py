@@ -107,7 +107,7 @@ def _facts(info: ModelInfo, mesh: Mesh) -> Iterator[str]:
     if info.diameter != (across := diameter(mesh.corners)):
         yield f"expected a diameter of {across} m, as the GLB has, found {info.diameter}"
     if info.symmetries is not None:
-        yield from lacking(Surface.of(mesh), info.symmetries)
+        yield from lacking(Surface.from_mesh(mesh), info.symmetries)
     if info.looks is not None and not is_alike(info.looks, appearance_of(mesh)):
         yield "expected looks of the GLB, found others"
     if info.keypoints is not None:

@@ -34,6 +34,6 @@ class Stage(Protocol):
         """
         ...
 
-    def of(self, shot: Shot) -> Self:
+    def for_shot(self, shot: Shot) -> Self:
         """A stage for another shot with an equal `stage_key`, which reuses everything built for still things."""
         ...

@@ -109,7 +109,7 @@ class AirSim(Tree):
         super().__init__(dataset)
         self._kinds = tuple(dict.fromkeys(options.images))
 
-    def of(self, sample: Sample) -> Iterator[File | Piece]:
+    def sample_files(self, sample: Sample) -> Iterator[File | Piece]:
         """The images of a sensor at an instant, a line of the log, and the sensor's settings."""
         root = scene(sample) if sample.sequence else sample.split or "all"
         seconds = sample.time if sample.sequence else sample.index / 1000

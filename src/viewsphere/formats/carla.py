@@ -98,10 +98,10 @@ class Carla(Tree):
     def __init__(self, dataset: Dataset) -> None:
         super().__init__(dataset)
         stuff = {name: TAGS.index(tag) for name, tag in STUFF.items()}
-        self._tags = Numbered.of(dataset.classes, stuff, THINGS, DYNAMIC, counted=False).table
+        self._tags = Numbered.from_classes(dataset.classes, stuff, THINGS, DYNAMIC, counted=False).table
         self._thing = {one.name: int(self._tags[one.id]) for one in dataset.classes if one.is_thing}
 
-    def of(self, sample: Sample) -> Iterator[File | Piece]:
+    def sample_files(self, sample: Sample) -> Iterator[File | Piece]:
         """A picture, its maps, its objects, and its camera."""
         split, _, number = self.stem(sample).partition("/")
         if sample.sequence:

@@ -45,7 +45,7 @@ class CocoPanoptic(Tree):
         ordered = sorted(dataset.classes, key=lambda one: not one.is_thing)
         self._classes = {one.id: (number, one) for number, one in enumerate(ordered, 1)}
 
-    def of(self, sample: Sample) -> Iterator[File | Piece]:
+    def sample_files(self, sample: Sample) -> Iterator[File | Piece]:
         """A picture, its segments' map, and its entries of the split's JSON."""
         split, _, name = self.stem(sample).partition("/")
         name = f"{name.rpartition('/')[0]}/{sample.index + 1:012d}".lstrip("/")

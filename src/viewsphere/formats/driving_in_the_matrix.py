@@ -58,7 +58,7 @@ class Matrix(Tree):
         super().__init__(dataset)
         self._smallest = options.smallest
 
-    def of(self, sample: Sample) -> Iterator[File | Piece]:
+    def sample_files(self, sample: Sample) -> Iterator[File | Piece]:
         """A picture and its objects."""
         split, _, name = self.stem(sample).partition("/")
         yield File(f"{ROOT}/JPEGImages/{name}.png", picture(sample, ".png"))

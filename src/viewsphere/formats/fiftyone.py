@@ -58,7 +58,7 @@ class FiftyOne(Tree):
         self._lines = list(dict.fromkeys(pair for points in known for pair in points.skeleton))
         self._bits = np.uint8 if all(one.id < 256 for one in dataset.classes) else np.uint16
 
-    def of(self, sample: Sample) -> Iterator[File | Piece]:
+    def sample_files(self, sample: Sample) -> Iterator[File | Piece]:
         """A picture, its maps, its objects' masks and its entry."""
         stem = self.stem(sample)
         file, seen = f"data/{stem}{suffix_of(sample, *KINDS)}", [o for o in sample.objects if o.box2d is not None]

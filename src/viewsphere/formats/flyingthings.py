@@ -85,7 +85,7 @@ class FlyingThings(Tree):
         check_whole(dataset, "flyingthings")
         self._set, self._eyes = options.set, Eyes(dataset)
 
-    def of(self, sample: Sample) -> Iterator[File | Piece]:
+    def sample_files(self, sample: Sample) -> Iterator[File | Piece]:
         """A picture, its maps, and its cameras."""
         folder, side = self._scene(sample), self._eyes.side(sample)
         name = number(sample.instant, instants(self.dataset, sample))

@@ -96,7 +96,7 @@ class Hdf5(Tree):
         most = {"class_segmaps": max((category.id for category in dataset.categories), default=0)}
         self._types = {key: np.min_scalar_type(most.get(key, dataset.max_objects)) for key in SOURCES if "segmaps" in key}
 
-    def of(self, sample: Sample) -> Iterator[File | Piece]:
+    def sample_files(self, sample: Sample) -> Iterator[File | Piece]:
         """The container of a sample."""
         folder = self.stem(sample).rpartition("/")[0]
         yield File(f"{folder}/{sample.index}.hdf5", Coded(sample.index, f"{self._keys}.hdf5", lambda: self._container(sample)))

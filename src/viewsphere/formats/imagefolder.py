@@ -70,7 +70,7 @@ class ImageFolder(Tree):
         super().__init__(dataset)
         self._by = options.by
 
-    def of(self, sample: Sample) -> Iterator[File | Piece]:
+    def sample_files(self, sample: Sample) -> Iterator[File | Piece]:
         """A picture and its line; nothing for a picture without objects."""
         seen = [o for o in sample.objects if o.area]
         if not seen:

@@ -51,7 +51,7 @@ class KittiDepth(Tree):
         check_whole(dataset, "kitti_depth")
         self._eyes = Eyes(dataset)
 
-    def of(self, sample: Sample) -> Iterator[File]:
+    def sample_files(self, sample: Sample) -> Iterator[File]:
         """A picture, its depth and, with a sequence's first picture, the lenses."""
         root, side = sample.split if sample.split in ("val", "test") else "train", self._eyes.side(sample)
         folder, camera = f"{root}/{scene(sample)}", CAMERAS[side]

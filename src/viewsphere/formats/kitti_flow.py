@@ -87,7 +87,7 @@ class KittiFlow(Tree):
         left, right = ("image_2", "image_3") if self._has_motion else ("colored_0", "colored_1")
         self._pictures: dict[str, str] = {"left": left, "right": right}
 
-    def of(self, sample: Sample) -> Iterator[File]:
+    def sample_files(self, sample: Sample) -> Iterator[File]:
         """A picture as the second and as the first of a pair, and the labels of a left one as the first."""
         side = self._eyes.side(sample)
         root = "testing" if sample.split == "test" else "training"

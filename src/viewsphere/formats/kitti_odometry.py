@@ -62,7 +62,7 @@ class KittiOdometry(Tree):
         super().__init__(dataset)
         self._timeline = Timeline(dataset)
 
-    def of(self, sample: Sample) -> Iterator[File | Piece]:
+    def sample_files(self, sample: Sample) -> Iterator[File | Piece]:
         """Yield the files of a sensor's sample: its picture or points, and, with the left camera, the pose."""
         course, (shot, instant, place) = self._timeline.course(sample), self._timeline.taken(sample)
         car = car_in(shot, "kitti_odometry")

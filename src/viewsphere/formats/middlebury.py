@@ -73,7 +73,7 @@ class Middlebury(Tree):
         super().__init__(dataset)
         self._eyes, self._is_eth3d = Eyes(dataset), options.set == "eth3d"
 
-    def of(self, sample: Sample) -> Iterator[File]:
+    def sample_files(self, sample: Sample) -> Iterator[File]:
         """An eye's picture and disparity; the left eye also gives the files of the pair."""
         eye, pictures, truth = ("left", "right").index(self._eyes.side(sample)), *self._folders(sample)
         yield File(f"{pictures}/im{eye}.png", picture(sample, ".png"))

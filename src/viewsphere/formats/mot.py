@@ -63,7 +63,7 @@ class Mot(Tree):
         self._field = {"visible": "box2d", "whole": "box2d_projected"}[options.boxes]
         self._labels = "".join(f"{category.name}\n" for category in dataset.categories)
 
-    def of(self, sample: Sample) -> Iterator[File | Piece]:
+    def sample_files(self, sample: Sample) -> Iterator[File | Piece]:
         """A picture, its lines, and the description of its sequence."""
         name = sample.sequence if sample.sensor == CAMERA else f"{sample.sequence}-{sample.sensor}"
         folder, suffix = f"{sample.split or 'all'}/{name}", suffix_of(sample, *KINDS)

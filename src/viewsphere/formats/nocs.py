@@ -66,7 +66,7 @@ def refuses(scope: Scope) -> Iterator[str]:
 class Nocs(Tree):
     """The tree of scenes."""
 
-    def of(self, sample: Sample) -> Iterator[File | Piece]:
+    def sample_files(self, sample: Sample) -> Iterator[File | Piece]:
         """Yield the files of a picture."""
         if "nocs" not in sample.channels:
             raise UserError(f"nocs: expected channel nocs; found none of frame {sample.index}")

@@ -97,7 +97,7 @@ class Nyc3dCars(Tree):
         self._earth_from_world[:3, :3] = _compass(*at)
         self._earth_from_world[:3, 3] = _earth(*at, options.altitude)
 
-    def of(self, sample: Sample) -> Iterator[File | Piece]:
+    def sample_files(self, sample: Sample) -> Iterator[File | Piece]:
         """A picture, its row and the rows of its vehicles."""
         name = f"{self.stem(sample)}.jpg"
         yield File(f"images/{name}", picture(sample, ".jpg"))

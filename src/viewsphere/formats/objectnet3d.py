@@ -70,7 +70,7 @@ class ObjectNet3d(Tree):
         if "classes" in dataset.splits:
             raise UserError("objectnet3d: expected splits whose lists have other names than that of categories; found classes")
 
-    def of(self, sample: Sample) -> Iterator[File | Piece]:
+    def sample_files(self, sample: Sample) -> Iterator[File | Piece]:
         """A picture and its record."""
         split, _, stem = self.stem(sample).partition("/")
         name = stem.rpartition("/")[2]

@@ -61,7 +61,7 @@ def refuses(scope: Scope) -> Iterator[str]:
 class Omni3d(Tree):
     """The tree of splits."""
 
-    def of(self, sample: Sample) -> Iterator[File | Piece]:
+    def sample_files(self, sample: Sample) -> Iterator[File | Piece]:
         """A picture, its image and its annotations."""
         stem, plan = self.stem(sample), self.dataset.plan
         place, table = f"{NAME}/{stem}{suffix_of(sample, *KINDS)}", f"Omni3D/{NAME}_{sample.split or 'all'}.json"

@@ -54,7 +54,7 @@ class Opencv(Tree):
         super().__init__(dataset)
         self._rigs = Rigs(dataset)
 
-    def of(self, sample: Sample) -> Iterator[File]:
+    def sample_files(self, sample: Sample) -> Iterator[File]:
         """A picture's camera, with its pose."""
         camera = sample.camera
         if not camera.lens.is_scan:

@@ -71,7 +71,7 @@ class RenderForCnn(Tree):
         super().__init__(dataset)
         self._numbers = {category.name: number for number, category in enumerate(dataset.categories)}
 
-    def of(self, sample: Sample) -> Iterator[File | Piece]:
+    def sample_files(self, sample: Sample) -> Iterator[File | Piece]:
         """The pictures of a sample's objects, and their lines."""
         split = sample.split or "all"
         for o in sample.objects:

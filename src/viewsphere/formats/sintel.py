@@ -82,7 +82,7 @@ class Sintel(Tree):
         check_whole(dataset, "sintel")
         self._stereo, self._eyes = options.stereo, Eyes(dataset)
 
-    def of(self, sample: Sample) -> Iterator[File]:
+    def sample_files(self, sample: Sample) -> Iterator[File]:
         """A picture and, for the left eye, its labels."""
         count, side = instants(self.dataset, sample), self._eyes.side(sample)
         name = f"{scene(sample)}/frame_{number(sample.instant + 1, count)}"

@@ -103,9 +103,9 @@ class Sscnet(Tree):
 
     def __init__(self, dataset: Dataset) -> None:
         super().__init__(dataset)
-        self._classes = Numbered.of(dataset.classes, STUFF, THINGS, OTHER, counted=False).table
+        self._classes = Numbered.from_classes(dataset.classes, STUFF, THINGS, OTHER, counted=False).table
 
-    def of(self, sample: Sample) -> Iterator[File]:
+    def sample_files(self, sample: Sample) -> Iterator[File]:
         """The depth and the cells of a picture."""
         options = Voxels.model_validate(sample.options.get("voxels", {}))
         if (options.size, options.cell) != (SIZE, CELL):
@@ -114,7 +114,7 @@ class Sscnet(Tree):
         where = scene(sample) if sample.sequence else "still"
         name = f"depthbin/{sample.split or 'all'}/{sample.index:08d}_{where}_fl000_rm0000_0000"
         yield File(f"{name}.png", Coded(sample.index, "sscnet.png", partial(_depth, sample)))
-        cells = partial(_cells, sample, Grid.of(options, sample.camera), self._classes)
+        cells = partial(_cells, sample, Grid.for_camera(options, sample.camera), self._classes)
         yield File(f"{name}.bin", Coded(sample.index, "sscnet.bin", cells))
 
     def notes(self) -> Iterator[str]:

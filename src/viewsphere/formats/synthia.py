@@ -155,11 +155,11 @@ class Synthia(Tree):
         self._rand = options.layout == "rand"
         light = LIGHTS[options.layout]
         things = {**THINGS, "trafficlight": light}
-        self._numbered = Numbered.of(dataset.classes, STUFF, things, light + 1)
+        self._numbered = Numbered.from_classes(dataset.classes, STUFF, things, light + 1)
         self._names, self._colors = _named(self._numbered, dataset.classes, light)
         self._eyes = None if self._rand else Eyes(dataset)
 
-    def of(self, sample: Sample) -> Iterator[File | Piece]:
+    def sample_files(self, sample: Sample) -> Iterator[File | Piece]:
         """A picture, and its labels."""
         classes = self._numbered.table
         color = Coded(sample.index, f"synthia {self._rand}.png", lambda: encode_png(self._colors[_ids(sample, classes)]))

@@ -79,7 +79,7 @@ class Tapvid(Tree):
         check_whole(dataset, "tapvid")
         self._make, self._ending = {"tapvid": (self._pickled, "pkl"), "tapvid3d": (self._archived, "npz")}[options.kind]
 
-    def of(self, sample: Sample) -> Iterator[File]:
+    def sample_files(self, sample: Sample) -> Iterator[File]:
         """Yield nothing, because a file holds a whole sequence."""
         yield from ()
 

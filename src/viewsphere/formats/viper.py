@@ -124,10 +124,10 @@ class Viper(Tree):
     def __init__(self, dataset: Dataset) -> None:
         super().__init__(dataset)
         check_whole(dataset, "viper")
-        self._classes = Numbered.of(dataset.classes, STUFF, THINGS, len(CLASSES.splitlines()))
+        self._classes = Numbered.from_classes(dataset.classes, STUFF, THINGS, len(CLASSES.splitlines()))
         self._timeline = Timeline(dataset)
 
-    def of(self, sample: Sample) -> Iterator[File | Piece]:
+    def sample_files(self, sample: Sample) -> Iterator[File | Piece]:
         """A picture, its maps, its flow, and a line for its camera."""
         course, sensor = self._timeline.course(sample), sample.origin.sensor if sample.origin else 0
         sequence = f"{course.number + 1:03d}{f'-{sensor}' if sensor else ''}"

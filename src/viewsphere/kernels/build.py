@@ -39,7 +39,7 @@ class Target:
     lacking: tuple[str, ...] = ()
 
     @staticmethod
-    def of(triple: str, host: str, features: Mapping[str, bool], native: bool) -> Target:
+    def for_machine(triple: str, host: str, features: Mapping[str, bool], native: bool) -> Target:
         """The target on a machine: `COMMON` on x86-64, so that all such machines run the same code. Other machines, those that
         lack its instructions, and `native` ones get code for their own processor.
         """
@@ -66,7 +66,7 @@ def _features() -> Mapping[str, bool]:
 
 HOST = llvmlite.binding.get_host_cpu_name()
 TRIPLE = llvmlite.binding.get_process_triple()
-TARGET = Target.of(TRIPLE, HOST, _features(), native=os.environ.get("VIEWSPHERE_NATIVE", "0") != "0")
+TARGET = Target.for_machine(TRIPLE, HOST, _features(), native=os.environ.get("VIEWSPHERE_NATIVE", "0") != "0")
 
 _PYTHON = f"{sys.implementation.cache_tag}{getattr(sys, 'abiflags', '')}"
 _NUMPY = version("numpy").partition(".")[0]  # numpy's major versions type constants differently

@@ -36,7 +36,7 @@ class BirdsEye:
     yaw_deg: float
 
 
-def of(placement: Placement) -> Mapping[str, Any]:
+def fields(placement: Placement) -> Mapping[str, Any]:
     """The rectangle along the object's heading around its box (which may be tilted), and the rectangle's corners."""
     pose = placement.world_from_object
     cos, sin = _heading(pose)
@@ -90,7 +90,7 @@ def draw(pen: ImageDraw, sample: Sample, scale: float) -> None:
 
 
 LABEL = ObjectLabel.from_placement(
-    of,
+    fields,
     name="birds_eye",
     meaning="its box from above",
     axes="world",

@@ -22,7 +22,7 @@ PIXEL_TOLERANCE = 1e-6
 METRE_TOLERANCE = 1e-9
 
 
-def of(placement: Placement) -> Mapping[str, Any]:
+def fields(placement: Placement) -> Mapping[str, Any]:
     """The model's box in world axes, in camera axes, and projected."""
     in_world = transform(placement.world_from_object, placement.box)
     in_camera = transform(placement.camera_from_world, in_world)
@@ -85,7 +85,7 @@ def draw(pen: ImageDraw, sample: Sample, scale: float) -> None:
 _EIGHT = "vertices, ordered as in `viewsphere.geometry.box3d`"
 
 LABEL = ObjectLabel.from_placement(
-    of,
+    fields,
     name="box3d",
     meaning="its tight box along its own axes",
     fields=(

@@ -30,7 +30,7 @@ ROUNDED = 1e-6
 """Tolerated difference between the entries of a stored canonical pose and the recomputed ones."""
 
 
-def of(placement: Placement) -> Mapping[str, Any]:
+def fields(placement: Placement) -> Mapping[str, Any]:
     """The pose in camera, followed by the symmetry that brings its rotation nearest to the identity.
 
     G. Pitteri et al., On Object Symmetries and 6D Pose Estimation from Images (https://arxiv.org/abs/1908.07640), section 3.
@@ -118,7 +118,7 @@ def draw(pen: ImageDraw, sample: Sample, scale: float) -> None:
 
 
 LABEL = ObjectLabel.from_placement(
-    of,
+    fields,
     name="canonical_pose",
     meaning="one pose for all that look the same",
     axes="object to camera",

@@ -12,7 +12,7 @@ from viewsphere.labels.shared.spec import Drawing, Field, Models, ObjectLabel, r
 from viewsphere.model.sample import Sample
 
 
-def of(placement: Placement) -> Mapping[str, Any]:
+def fields(placement: Placement) -> Mapping[str, Any]:
     """The category from the model's entry in the recipe."""
     spec = placement.spec
     return {"category": spec.category, "supercategory": spec.supercategory, "category_id": spec.category_id}
@@ -30,7 +30,7 @@ def prove(sample: Sample, models: Models) -> Iterator[str]:
 
 
 LABEL = ObjectLabel.from_placement(
-    of,
+    fields,
     name="category",
     meaning="what kind of thing it is",
     fields=(

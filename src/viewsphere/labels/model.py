@@ -11,7 +11,7 @@ from viewsphere.labels.shared.spec import Drawing, Field, Models, ObjectLabel, r
 from viewsphere.model.sample import Sample
 
 
-def of(placement: Placement) -> Mapping[str, Any]:
+def fields(placement: Placement) -> Mapping[str, Any]:
     """The model's names."""
     spec, step = placement.spec, placement.step
     if step is None:
@@ -32,7 +32,7 @@ def prove(sample: Sample, models: Models) -> Iterator[str]:
 
 
 LABEL = ObjectLabel.from_placement(
-    of,
+    fields,
     name="model",
     meaning="which model it is",
     fields=(

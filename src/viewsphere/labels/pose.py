@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 TOLERANCE = 1e-9
 
 
-def of(placement: Placement) -> Mapping[str, Any]:
+def fields(placement: Placement) -> Mapping[str, Any]:
     """The pose in world axes and in camera axes."""
     in_camera = placement.camera_from_object
     return {
@@ -50,7 +50,7 @@ def draw(pen: ImageDraw, sample: Sample, scale: float) -> None:
 
 
 LABEL = ObjectLabel.from_placement(
-    of,
+    fields,
     name="pose",
     meaning="where it is and how it is turned",
     fields=(

@@ -12,7 +12,7 @@ from viewsphere.labels.shared.spec import Drawing, Field, Models, ObjectLabel, r
 from viewsphere.model.sample import Sample
 
 
-def of(placement: Placement) -> Mapping[str, Any]:
+def fields(placement: Placement) -> Mapping[str, Any]:
     """The named bin of the object's view."""
     view = placement.view
     return {"pose_category": pose_category(view.azimuth_deg, view.elevation_deg, placement.category_deg)}
@@ -31,7 +31,7 @@ def prove(sample: Sample, models: Models) -> Iterator[str]:
 
 
 LABEL = ObjectLabel.from_placement(
-    of,
+    fields,
     name="pose_category",
     meaning="which side of it is seen",
     axes="object",

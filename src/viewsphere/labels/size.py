@@ -15,7 +15,7 @@ TOLERANCE = 1e-9
 """Tolerance of the proof as a share of the size."""
 
 
-def of(placement: Placement) -> Mapping[str, Any]:
+def fields(placement: Placement) -> Mapping[str, Any]:
     """The 3D box's extents, and the model's true size."""
     return {"size": Box3d(placement.box).size, "real_size": placement.facts.real_size}
 
@@ -32,7 +32,7 @@ def prove(sample: Sample, models: Models) -> Iterator[str]:
 
 
 LABEL = ObjectLabel.from_placement(
-    of,
+    fields,
     name="size",
     meaning="how large it is: width along X, height along Z, length along Y of its own axes",
     axes="object",

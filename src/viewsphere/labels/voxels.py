@@ -62,7 +62,7 @@ def compute(context: LabelContext) -> NDArray[np.void]:
     """
     from viewsphere.geometry.voxels import kernels_voxels as kernels
 
-    grid = Grid.of(context.options_of("voxels", Voxels), context.camera)
+    grid = Grid.for_camera(context.options_of("voxels", Voxels), context.camera)
     owner, filled = np.full(grid.size, -1, np.int32), np.zeros(grid.size, np.uint8)
     points = grid.cells(context.geometry.vertices)
     _occupy(context, points, owner, filled)
@@ -203,9 +203,9 @@ def prove(sample: Sample, models: Models) -> Iterator[str]:
     runs = channel_of(sample, "voxels")
     if runs is None or sample.known_camera is None:
         return
-    grid = Grid.of(Voxels.model_validate(sample.options.get("voxels", {})), sample.camera)
+    grid = Grid.for_camera(Voxels.model_validate(sample.options.get("voxels", {})), sample.camera)
     try:
-        cells = VoxelGrid.of(runs, grid)
+        cells = VoxelGrid.from_runs(runs, grid)
     except ValueError as error:
         yield str(error).removeprefix("voxels: ")
         return

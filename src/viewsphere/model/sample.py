@@ -319,7 +319,7 @@ class Sample(Shown):
 
         categories = {o.id: o.category_id for o in self.objects}
         try:
-            return PointCloud.of(self.channels, self.camera, categories, axes, surface)
+            return PointCloud.from_channels(self.channels, self.camera, categories, axes, surface)
         except ValueError as error:
             raise StoreError(f"frame {self.index}: {error}") from None
 
@@ -335,8 +335,8 @@ class Sample(Shown):
         if "voxels" not in self.channels:
             raise StoreError(f"frame {self.index}: expected the channel voxels, found none: add it to the recipe's channels")
         try:
-            return VoxelGrid.of(
-                self.channels["voxels"], Grid.of(Voxels.model_validate(self.options.get("voxels", {})), self.camera)
+            return VoxelGrid.from_runs(
+                self.channels["voxels"], Grid.for_camera(Voxels.model_validate(self.options.get("voxels", {})), self.camera)
             )
         except ValueError as error:
             raise StoreError(f"frame {self.index}: {error}") from None

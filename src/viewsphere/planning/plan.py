@@ -450,7 +450,7 @@ def plan(recipe: Recipe | str | PathLike[str], shot_frames: int | None = None) -
     Raises:
         RecipeError: A field is invalid, a file is missing, an engine or format is unknown, or the plan exceeds `max_frames`.
     """
-    recipe = Recipe.of(recipe)
+    recipe = Recipe.ensure(recipe)
     with recipe.located():
         check_names(recipe)
         check_blend(recipe)
@@ -493,7 +493,7 @@ def plan(recipe: Recipe | str | PathLike[str], shot_frames: int | None = None) -
             entries=tuple(number for _, number in numbered),
             timelines=lines,
             distractors=distractors,
-            tracks=tracks_of(recipe, rig or Rig.of(lens(recipe, views))),
+            tracks=tracks_of(recipe, rig or Rig.single(lens(recipe, views))),
         )
         check_all_frames(recipe, planned.frames, planned.factors)
         if timings or any(lines):

@@ -14,7 +14,7 @@ from viewsphere.model.shot import Shot
 from viewsphere.plugins.registry import Kind
 from viewsphere.plugins.spec import Spec
 
-STAGE = ("at", "paint", "of")
+STAGE = ("at", "paint", "for_shot")
 """Methods of a stage, see `viewsphere.engines.Stage`."""
 
 

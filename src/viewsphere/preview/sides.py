@@ -43,7 +43,7 @@ def four_sides(spec: ModelSpec, axes: tuple[Axis, Axis] | None = None, size: int
     shot = Shot(
         key=spec.key,
         things=(Thing(id=1, model=spec),),
-        rig=Rig.of(Intrinsics(width=size, height=size, fx=focal, fy=focal, cx=size / 2, cy=size / 2)),
+        rig=Rig.single(Intrinsics(width=size, height=size, fx=focal, fy=focal, cx=size / 2, cy=size / 2)),
         scene=Scene(ground=Ground()),
         instants=tuple(looking(side, (x, y, z), index=side.index) for side in sides),
         channels=("rgb", "instances"),

@@ -362,7 +362,7 @@ class Recipe(Shown, Frozen):
         return cls.model_validate(data, context={"marks": marks, "folder": file.parent})
 
     @classmethod
-    def of(cls, recipe: Recipe | str | PathLike[str]) -> Recipe:
+    def ensure(cls, recipe: Recipe | str | PathLike[str]) -> Recipe:
         """The recipe itself, or the recipe in a file.
 
         Args:

@@ -117,7 +117,7 @@ def generate(
     """
     begun = time.monotonic()
     own_shard = ALL if shard is None else shard_of(shard)
-    recipe = Recipe.of(recipe)
+    recipe = Recipe.ensure(recipe)
     planned = prepare(recipe)
     wanted = _asked(recipe, formats)
     store = Store(located(out))

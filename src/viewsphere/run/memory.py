@@ -157,7 +157,7 @@ def render(
     """
     if epochs is not None and not (isinstance(epochs, int) and epochs > 0):
         raise UserError(f"epochs: expected a number of 1 or more, or None for endless frames; found {shown(epochs)}")
-    return Frames(Recipe.of(recipe), None if shard is None else shard_of(shard), shuffle, epochs, redraw)
+    return Frames(Recipe.ensure(recipe), None if shard is None else shard_of(shard), shuffle, epochs, redraw)
 
 
 @dataclass(frozen=True, eq=False)

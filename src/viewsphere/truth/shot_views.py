@@ -151,7 +151,7 @@ class ShotViews:
         triangle, weights = np.concatenate([NO_POINTS[0], *(t for t, _ in drawn)]), [w for _, w in drawn]
         on = np.repeat(np.array(things, np.int32), [len(t) for t, _ in drawn])
         joined = np.concatenate([NO_POINTS[1], *weights])
-        return SurfacePoints.of(view, on, triangle.astype(np.int32), joined, np.zeros_like(joined))
+        return SurfacePoints.from_weights(view, on, triangle.astype(np.int32), joined, np.zeros_like(joined))
 
     def _picked(self, sensor: int) -> Followed:
         tracks = self.shot.tracks

@@ -44,7 +44,7 @@ def located(root: str | os.PathLike[str]) -> Path:
         return Path(root)
     if text.startswith("file:"):
         return Path("/" + text.removeprefix("file:").lstrip("/"))
-    return RemotePath.of(text)
+    return RemotePath.from_url(text)
 
 
 def files_below(folder: Path) -> Iterator[str]:

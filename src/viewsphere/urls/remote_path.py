@@ -50,7 +50,7 @@ class RemotePath(Base):
     """
 
     @classmethod
-    def of(cls, url: str) -> RemotePath:
+    def from_url(cls, url: str) -> RemotePath:
         """The path of a URL; raises UserError for one with a password."""
         if _SECRET.search(re.sub(r":/+", "://", url)):
             raise UserError(

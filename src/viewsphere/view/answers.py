@@ -84,7 +84,7 @@ class Answers:
         self._counting = threading.Lock()
         self._counted: tuple[int, float, bytes] | None = None
 
-    def of(self, path: str, asked: Parameters) -> Answer | None:
+    def answer(self, path: str, asked: Parameters) -> Answer | None:
         """The answer to a path and its parameters; None for an unknown path. Raises UserError for invalid parameters."""
         known = self._paths.get(path)
         return None if known is None else known(asked)
@@ -125,7 +125,7 @@ class Answers:
         known, listed, read = self._live.known, _whole(plain, "listed", -1), _whole(plain, "read", -1)
         listed = len(known.frames) if listed < 0 else min(listed, len(known.frames))
         read = known.read if read < 0 else min(read, known.read)
-        query = Query.of(plain)
+        query = Query.from_parameters(plain)
         # Columns that a query does not need do not change it.
         searched = read if query.needs_labels else listed
         found = self._found(query, searched, read if query.needs_labels else 0)

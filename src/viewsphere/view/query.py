@@ -76,7 +76,7 @@ class Query:
         return self != Query(order=self.order) or self.order not in ORDERS
 
     @staticmethod
-    def of(asked: Mapping[str, str]) -> Query:
+    def from_parameters(asked: Mapping[str, str]) -> Query:
         """The query from a page's parameters; raises UserError for an invalid one."""
         known = {"category", "model", "split", "pose", "order", *MEASURES}
         for name in asked.keys() - known:

@@ -346,7 +346,7 @@ class _Handler(BaseHTTPRequestHandler):
             self._to_page()
             return
         try:
-            answer = None if target.scheme or target.netloc else self.server.answers.of(target.path, asked)
+            answer = None if target.scheme or target.netloc else self.server.answers.answer(target.path, asked)
         except ViewsphereError as error:
             self.send_error(HTTPStatus.UNPROCESSABLE_ENTITY, without_folders(str(error)))
             return

@@ -131,7 +131,7 @@ def _outside(p: Interior) -> list[Piece]:
         Piece("outer_wall", plaster, walls.level(low, high, p.height + SLAB)),
     ]
     for side in SIDES:
-        found = [(room, o) for room in p.rooms for o in room.of(side) if o.opens == "window"]
+        found = [(room, o) for room in p.rooms for o in room.openings_in(side) if o.opens == "window"]
         holes = [replace(o, x=-shell.along(side, room, o.x), foot=o.foot + SLAB) for room, o in found]
         facade = moved(walls.wall(shell.length(side), p.height + 2 * SLAB, holes, 0.0), (0, 0, -SLAB))
         pieces.append(Piece("outer_wall", plaster, walls.on_side(facade, shell, side, outwards=True)))
@@ -152,10 +152,10 @@ def _room(p: Interior, room: Room, joinery: Joinery, images: list[Image], rng: n
     ]
     for side in SIDES:
         own = [
-            Piece("wall", paper, walls.wall(room.length(side), p.height, room.of(side), _depth(p, room, side))),
-            Piece("skirting", joinery.frame, walls.skirting(room.length(side), room.of(side), TRIM)),
+            Piece("wall", paper, walls.wall(room.length(side), p.height, room.openings_in(side), _depth(p, room, side))),
+            Piece("skirting", joinery.frame, walls.skirting(room.length(side), room.openings_in(side), TRIM)),
         ]
-        for o in room.of(side):
+        for o in room.openings_in(side):
             own += [Piece(q.part, q.material, moved(q.solid, (o.x, 0, o.foot))) for q in _filled(o, joinery, rng)]
             if o.foot <= 0 and o.opens != "entrance":
                 a, b = o.span

@@ -266,7 +266,7 @@ class Furnishing:
     def _sides(self, sides: Iterable[Side]) -> list[Side]:
         """The sides in a random order, sides without openings first."""
         chance: dict[Side, float] = {side: float(self.rng.random()) for side in sides}
-        return sorted(chance, key=lambda side: (len(self.room.of(side)), chance[side]))
+        return sorted(chance, key=lambda side: (len(self.room.openings_in(side)), chance[side]))
 
     def _along(self, family: str, seed: int, p: Any, side: Side, gap: float) -> Iterator[Stand]:
         """Yield the free spots along a wall."""

@@ -81,6 +81,6 @@ class Room:
         right, up = RIGHT[side]
         return x + (a - c) * right + (b - d) * up
 
-    def of(self, side: Side) -> tuple[Opening, ...]:
+    def openings_in(self, side: Side) -> tuple[Opening, ...]:
         """Return the openings in a wall."""
         return tuple(opening for opening in self.openings if opening.side == side)

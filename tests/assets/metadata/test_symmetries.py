@@ -200,7 +200,7 @@ def test_shapes_without_symmetries(name, axes):
     "family", ["bench", "bicycle", "boat", "car", "chair", "hair_drier", "post_box", "tree", "wheelie_bin"]
 )
 def test_the_zoo_has_mirrors_alone(family):
-    assert find(Surface.of(build(family, np.random.default_rng(1)))) == Symmetries()
+    assert find(Surface.from_mesh(build(family, np.random.default_rng(1)))) == Symmetries()
 
 
 @pytest.mark.slow

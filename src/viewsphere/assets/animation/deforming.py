@@ -32,7 +32,7 @@ class DeformingMesh:
     meshes: Mapping[int, Mesh]
 
     @staticmethod
-    def of(meshes: Mapping[int, Mesh]) -> DeformingMesh:
+    def from_meshes(meshes: Mapping[int, Mesh]) -> DeformingMesh:
         """These meshes by frame."""
         shared = accumulate(sorted(meshes.items()), lambda last, now: (now[0], sharing(now[1], last[1])))
         return DeformingMesh(dict(shared))

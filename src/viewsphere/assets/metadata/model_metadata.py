@@ -49,7 +49,7 @@ def metadata_of(spec: ModelSpec, mesh: Mesh, facts: FileFacts, step: TimeStep | 
         return ModelMetadata(across, color=color, material=material)
     if step is not None and step.frame != frame_of(spec, None):
         return ModelMetadata(across, keypoints=_own(mesh, across, facts), color=color, material=material)
-    if said.symmetries is not None and (problem := next(lacking(Surface.of(mesh), said.symmetries), None)):
+    if said.symmetries is not None and (problem := next(lacking(Surface.from_mesh(mesh), said.symmetries), None)):
         raise ModelError(f"{path}: {problem}")
     if said.keypoints is not None and (problem := next(far_points(mesh, across, said.keypoints), None)):
         raise ModelError(f"{path}: keypoints.{problem}")
@@ -84,7 +84,7 @@ def found_symmetries(mesh: Mesh) -> Symmetries:
     return kept(
         "models",
         digest.hexdigest(),
-        lambda: find(Surface.of(mesh)),
+        lambda: find(Surface.from_mesh(mesh)),
         lambda found: Content(found.model_dump(mode="json"), {}),
         lambda content: Symmetries.model_validate(content.about),
     )

@@ -50,7 +50,7 @@ class Surface:
     corners: Float
 
     @staticmethod
-    def of(mesh: Mesh) -> Surface:
+    def from_mesh(mesh: Mesh) -> Surface:
         """The surface of a mesh, without its materials."""
         corners = mesh.vertices.astype(np.float64)[mesh.triangles]
         solid = (face_normals(mesh.vertices.astype(np.float64), mesh.triangles) != 0).any(axis=1)

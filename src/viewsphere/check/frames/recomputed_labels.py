@@ -43,7 +43,7 @@ class RecomputedLabels:
 
     def differences(self, sample: Sample) -> Findings:
         """Yield the differences between a sample's stored and recomputed labels; none if the scenery has changed."""
-        context = self._reconstructor.of(sample, sample.files)
+        context = self._reconstructor.context(sample, sample.files)
         if context is None:
             return
         for name, label in channel_labels().items():

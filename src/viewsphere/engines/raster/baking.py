@@ -77,7 +77,7 @@ def pack(arranged: Arranged, ground: Ground | None, lengths: Lengths, materials:
     geometry, meshes = arranged.geometry, arranged.meshes
     if materials is None:
         materials = pack_materials(arranged.whole, ground, lengths, arranged.targets, arranged.things)
-    rows = Rows.of(geometry, meshes, materials, lengths)
+    rows = Rows.from_geometry(geometry, meshes, materials, lengths)
     surfaces, is_drive = rows.surfaces, arranged.is_sequence and arranged.has_scenery
     rows.write({*range(arranged.targets), *arranged.moving} if is_drive else range(len(meshes)))
     see_through = np.append(_is_see_through(surfaces.looks)[surfaces.material], False)
@@ -92,7 +92,7 @@ def pack(arranged: Arranged, ground: Ground | None, lengths: Lengths, materials:
         owner=(geometry.triangle_object * len(surfaces.looks) + surfaces.material).astype(np.int32),
         see_through=see_through,
         blended=with_blended_colors(geometry, meshes),
-        maps=StillMaps.of(rows.part, len(meshes), arranged.moving, arranged.targets) if arranged.is_sequence else None,
+        maps=StillMaps.for_things(rows.part, len(meshes), arranged.moving, arranged.targets) if arranged.is_sequence else None,
     )
 
 
@@ -137,7 +137,9 @@ def bake(packed: Packed, scene: Scene, options: Options, shades: TargetShades, b
         occlusion = shades.bake(packed.arranged, casters, lengths.unit, has_ground, options.ambient_occlusion)
     else:
         occlusion = bake_occlusion(casters, has_ground, options.ambient_occlusion, arranged.targets == 1)
-    bounce_scene = bounce_scenes.of(packed.arranged, packed.rows, casters, floor, ground, lengths, has_ground, options.bounces)
+    bounce_scene = bounce_scenes.find(
+        packed.arranged, packed.rows, casters, floor, ground, lengths, has_ground, options.bounces
+    )
     bounces = NO_BOUNCES if bounce_scene is None else bake_bounces(bounce_scene, surrounding, lights)
     if bounce_scene is not None and bounce_scene.has_map:
         occlusion = of_ground_alone(occlusion)

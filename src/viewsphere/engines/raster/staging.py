@@ -58,9 +58,9 @@ class RasterStage:
         """The shot that the stage paints."""
         return self.arrangements.shot
 
-    def of(self, shot: Shot) -> RasterStage:
+    def for_shot(self, shot: Shot) -> RasterStage:
         """The stage for another shot with an equal `stage_key`."""
-        return replace(self, arrangements=self.arrangements.of(shot))
+        return replace(self, arrangements=self.arrangements.for_shot(shot))
 
     def at(self, instant: int) -> Geometry:
         """The world-space triangles at an instant, counted from 0 in the shot."""

@@ -119,9 +119,9 @@ class Arrangements:
         meshes = _dressed(shot.things, placed_meshes(shot.things, load), soaked)
         if shot.scene.lamps is not None:
             meshes = lit(shot.things, meshes, shot.scene.lamps)
-        return cls(shot, Shown(load, soaked), meshes, None, ring).of(shot)
+        return cls(shot, Shown(load, soaked), meshes, None, ring).for_shot(shot)
 
-    def of(self, shot: Shot) -> Arrangements:
+    def for_shot(self, shot: Shot) -> Arrangements:
         """The arrangements of another shot with an equal `stage_key`, which share the loaded meshes."""
         own = replace(self, shot=shot, _known={})
         return replace(own, floor=shot_floor(shot, lambda instant: own._meshes(shot.things_at(instant))))

@@ -114,7 +114,7 @@ def _save(dataset: Dataset, folder: Path, groups: Collection[_Group]) -> Iterato
         shots, instants, samples = zip(*_views(dataset, group), strict=True)
         name = group.model if counts[group.model] == 1 else f"{group.model}-{samples[0].index:06d}"
         own = shots[0].model_copy(update={"instants": instants})
-        load = StoredModels.of(dataset, own, samples[0])
+        load = StoredModels.for_sample(dataset, own, samples[0])
         save = plugins.load(EngineSpec, ENGINE).save
         assert save is not None
         yield from save(own, samples, load, folder / f"{name}.blend", dataset.name)
@@ -164,7 +164,7 @@ def _taken(known: Shot | None, key: str, place: int, sample: Sample) -> tuple[Sh
         now.model_copy(update={"world_from_rig": _plain(pose), "viewpoint": known.viewpoint(i, number), "intrinsics": lens})
         for i, (now, pose, lens) in enumerate(zip(known.instants, poses, lenses, strict=True))
     )
-    return known.model_copy(update={"rig": Rig.of(sensor.intrinsics), "instants": instants}), instant
+    return known.model_copy(update={"rig": Rig.single(sensor.intrinsics), "instants": instants}), instant
 
 
 def _alike(shot: Shot) -> bytes:
@@ -187,7 +187,7 @@ def _lit_anyhow(key: str, sample: Sample) -> Shot:
     return Shot(
         key=key,
         things=tuple(Thing(id=o.id, model=_spec(o.key, ""), motion=Motion.still(_matrix(o))) for o in sample.objects),
-        rig=Rig.of(sample.camera.intrinsics),
+        rig=Rig.single(sample.camera.intrinsics),
         scene=Scene(),
         instants=(_as_taken(sample),),
         channels=("rgb",),
@@ -226,7 +226,7 @@ class StoredModels:
     keys: Mapping[tuple[ModelSpec, TimeStep | None], tuple[str, str]]
 
     @classmethod
-    def of(cls, dataset: Dataset, shot: Shot, sample: Sample) -> StoredModels:
+    def for_sample(cls, dataset: Dataset, shot: Shot, sample: Sample) -> StoredModels:
         """Return the models that a sample of a shot shows."""
         there = {o.id: o for o in sample.objects}  # a sample of a sequence lacks objects that are not present
         shown = ((thing, there[thing.id]) for thing in shot.objects if thing.id in there)

@@ -121,7 +121,7 @@ class Bop(Tree):
             if info.step is not None:
                 raise UserError(f"bop: expected rigid models; found {info.track or info.key}, which deforms")
 
-    def of(self, sample: Sample) -> Iterator[File | Piece]:
+    def sample_files(self, sample: Sample) -> Iterator[File | Piece]:
         """A picture, its depth and its objects."""
         scene, image = _place(self.dataset, sample)
         found = entries(sample, self._numbers, self._options.depth_scale)

@@ -95,7 +95,7 @@ class Cityscapes(Tree):
         self._options, self._eyes, self._timeline = options, Eyes(dataset), Timeline(dataset)
         self._labels = labels_of(dataset.classes)
 
-    def of(self, sample: Sample) -> Iterator[File]:
+    def sample_files(self, sample: Sample) -> Iterator[File]:
         """A picture and, for a left one, its camera and labels."""
         side, name = self._eyes.side(sample), self._name(sample)
         yield File(f"{side}Img8bit/{name}_{side}Img8bit.png", picture(sample, ".png"))

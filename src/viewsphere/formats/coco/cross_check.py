@@ -182,7 +182,7 @@ def _expected(dataset: Dataset, append: Callable[[Entry], None], options: Option
     entries = Entries(dataset, options)
     for sample in dataset:
         masks = seen(sample)
-        append(entries.of(sample, masks))
+        append(entries.entry(sample, masks))
         yield from files(dataset, sample, masks, options)
     yield from models(dataset)
 

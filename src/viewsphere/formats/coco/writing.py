@@ -53,7 +53,7 @@ def preparer(dataset: Dataset, folder: Path, options: Options) -> Callable[[Samp
         masks = seen(sample)
         for _, name, content in files(dataset, sample, masks, options):
             put(dataset, content, folder / name)
-        return entries.of(sample, masks)
+        return entries.entry(sample, masks)
 
     return prepare
 
@@ -178,7 +178,7 @@ class Entries:
         self._ids, self._names = category_ids(dataset, options), point_names(dataset)
         self._licences = Licences(dataset)
 
-    def of(self, sample: Sample, masks: Masks) -> Entry:
+    def entry(self, sample: Sample, masks: Masks) -> Entry:
         """A sample's entry."""
         annotations = tuple(json_bytes(one) for one in self._annotations(sample, masks))
         captions = tuple(map(json_bytes, _caption_records(sample)))

@@ -74,7 +74,7 @@ class Colmap(Tree):
         self._binary = options.kind == "binary"
         self._rigs, self._sights = Rigs(dataset), Sights(dataset)
 
-    def of(self, sample: Sample) -> Iterator[File | Piece]:
+    def sample_files(self, sample: Sample) -> Iterator[File | Piece]:
         """A picture, its image record and points and, with the first picture of an instant, the frame."""
         now, world, own = self._rigs.at(sample), world_of(self.dataset, sample), sample.index + 1
         part = self.dataset.plan.part_of(sample.index)
@@ -92,7 +92,7 @@ class Colmap(Tree):
             images = [(cameras[sensor], now.first + sensor + 1) for sensor in now.there]
             pose = pose_of(now.pose.R, now.pose.t)
             yield self._piece(sparse, "frames", [Frame(now.first + 1, rig, pose, images)])
-        shown, camera = self._sights.of(sample), sample.camera
+        shown, camera = self._sights.shown(sample), sample.camera
         image = Image(own, pose_of(camera.R, camera.t), cameras[now.sensor], name, shown.seen)
         yield self._piece(sparse, "images", [image])
         yield self._piece(sparse, "points3D", shown.points)

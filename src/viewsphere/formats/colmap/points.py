@@ -38,7 +38,7 @@ class Sights:
         self._dataset = dataset
         self._followed = lru_cache(maxsize=4)(self._follow)
 
-    def of(self, sample: Sample) -> Shown:
+    def shown(self, sample: Sample) -> Shown:
         """Points followed through the sample's sequence, or points of a coarse grid that only this image has."""
         if sample.sequence and "tracks" in sample.channels:
             return self._of_tracks(sample, self._followed(sample.sequence, sample.sensor))

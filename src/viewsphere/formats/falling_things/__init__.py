@@ -106,7 +106,7 @@ class FallingThings(Tree):
         lenses = {} if shot is None else {sensor.name: sensor.intrinsics for sensor in shot.rig.sensors}
         self._lenses = [(side, lenses[name]) for name, side in self._sides.items()]
 
-    def of(self, sample: Sample) -> Iterator[File | Piece]:
+    def sample_files(self, sample: Sample) -> Iterator[File | Piece]:
         """A camera's picture, depth, classes and objects; raises UserError where an imported picture lacks a channel."""
         for name in missing(CHANNELS, sample.channels):
             raise UserError(f"frame {sample.index}: expected channel {name}; found none")

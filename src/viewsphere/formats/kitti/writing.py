@@ -61,7 +61,7 @@ class Kitti(Tree):
         self._timeline = Timeline(dataset)
         self._unplanned = lru_cache(maxsize=4)(self._found)
 
-    def of(self, sample: Sample) -> Iterator[File | Piece]:
+    def sample_files(self, sample: Sample) -> Iterator[File | Piece]:
         """Yield the files of a sensor's sample: its picture or points, and, with the left camera, the files of the frame as a
         whole.
         """
@@ -84,7 +84,7 @@ class Kitti(Tree):
         if sample.origin is not None or sample.sensor != CAMERA:
             shot, _, place = self._timeline.taken(sample)
             return shot.rig, car_in(shot, "kitti"), place
-        return None if sample.known_camera is None else Rig.of(sample.known_camera.intrinsics), Car(0), 0
+        return None if sample.known_camera is None else Rig.single(sample.known_camera.intrinsics), Car(0), 0
 
     def _course(self, sample: Sample) -> _Course:
         """The sequence of a sample. Raises UserError for a still picture."""

@@ -139,7 +139,7 @@ class Nerfstudio(Tree):
         self._options, self._kind = options, options.kind
         self._rigs = Rigs(dataset)
 
-    def of(self, sample: Sample) -> Iterator[File | Piece]:
+    def sample_files(self, sample: Sample) -> Iterator[File | Piece]:
         """A picture, its depth, and its entry."""
         lens, now, world = sample.camera.intrinsics, self._rigs.at(sample), world_of(self.dataset, sample)
         problem = _lens_problem(lens, self._kind)

@@ -87,7 +87,7 @@ class NuScenes(Tree):
         shot = next(iter(dataset.shots_of_parts), None)
         self._kinds = {} if shot is None else dict(zip(channels_of(shot.rig), modalities(shot.rig), strict=True))
 
-    def of(self, sample: Sample) -> Iterator[File | Piece]:
+    def sample_files(self, sample: Sample) -> Iterator[File | Piece]:
         """Yield the files and records of a sensor's sample. The first sensor of an instant also adds the records of the whole
         instant.
         """

@@ -38,7 +38,7 @@ class Pascal3d(Tree):
         if twice := next((name for name in lists if lists.count(name) > 1), None):
             raise UserError(f"pascal3d: expected categories and splits that make different names; found {twice} twice")
 
-    def of(self, sample: Sample) -> Iterator[File | Piece]:
+    def sample_files(self, sample: Sample) -> Iterator[File | Piece]:
         """A picture and its record for each category that it shows, and its maps."""
         split, _, stem = self.stem(sample).partition("/")
         name, seen = stem.rpartition("/")[2], [o for o in sample.objects if o.box2d is not None]

@@ -79,7 +79,7 @@ class Surreal(Tree):
         self._sequence = lru_cache(maxsize=SEQUENCES)(dataset.sequence)
         self._clip = lru_cache(maxsize=CLIPS)(self._made)
 
-    def of(self, sample: Sample) -> Iterator[File | Piece]:
+    def sample_files(self, sample: Sample) -> Iterator[File | Piece]:
         """The maps of a picture, numbered in its clip."""
         clip, k = self._clip_of(sample), sample.instant % MOST + 1
         depth, flow = sample.channels["depth"], sample.channels["flow_backward"]

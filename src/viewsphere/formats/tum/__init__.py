@@ -84,7 +84,7 @@ class Tum(Tree):
         self._mirrored = options.kind == "icl-nuim"
         self._rigs = Rigs(dataset)
 
-    def of(self, sample: Sample) -> Iterator[File | Piece]:
+    def sample_files(self, sample: Sample) -> Iterator[File | Piece]:
         """A picture, its depth, its pose, and the lines that name them."""
         lens, now, world = sample.camera.intrinsics, self._rigs.at(sample), world_of(self.dataset, sample)
         if lens.skew or not _is_held(lens):

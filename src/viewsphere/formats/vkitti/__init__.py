@@ -101,9 +101,9 @@ class VKitti(Tree):
     def __init__(self, dataset: Dataset, options: Options) -> None:
         super().__init__(dataset)
         self._old, self._variation = options.version == "1.3.1", options.variation
-        self._eyes, self._names = Eyes(dataset), Names.of(dataset.classes)
+        self._eyes, self._names = Eyes(dataset), Names.from_classes(dataset.classes)
 
-    def of(self, sample: Sample) -> Iterator[File | Piece]:
+    def sample_files(self, sample: Sample) -> Iterator[File | Piece]:
         """A picture, its maps, and its lines of each text."""
         yield from self._one(sample) if self._old else self._two(sample)
 

@@ -60,7 +60,7 @@ class Names:
     by_class: NDArray[np.uint8]
 
     @classmethod
-    def of(cls, classes: Iterable[SemanticClass]) -> Names:
+    def from_classes(cls, classes: Iterable[SemanticClass]) -> Names:
         """The names and colours of all of a data set's classes; a category that Virtual KITTI lacks keeps its colour."""
         things, colors, numbered = dict[str, str](), dict(COLORS), {0: COLORS["Undefined"]}
         stuff = {i: COLORS[STUFF.get(name, "Misc")] for name, i in STUFF_IDS.items()}

@@ -54,7 +54,7 @@ class Voc(Tree):
         self._options = options
         self._numbers = {category.id: number for number, category in enumerate(dataset.categories, 1)}
 
-    def of(self, sample: Sample) -> Iterator[File | Piece]:
+    def sample_files(self, sample: Sample) -> Iterator[File | Piece]:
         """A picture, its XML and its two maps. A picture with objects without masks, as imported ones may have, is not listed
         as segmented.
         """

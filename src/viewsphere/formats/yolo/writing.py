@@ -41,7 +41,7 @@ class Yolo(Tree):
         if options.task == "pose" and not self._points:
             raise UserError("yolo: expected models with keypoints for task pose; found none: name some in the models' sidecars")
 
-    def of(self, sample: Sample) -> Iterator[File | Piece]:
+    def sample_files(self, sample: Sample) -> Iterator[File | Piece]:
         """A picture and its labels."""
         stem = self.stem(sample)
         yield File(f"images/{stem}{suffix_of(sample, *KINDS)}", picture(sample, *KINDS))

@@ -76,7 +76,7 @@ def short_record(o: ObjectAnnotation, labels: Iterable[ObjectLabel]) -> dict[str
 class Makers:
     """The labels that restore short records, by the names of fields; `labels` includes the `wanted` labels."""
 
-    of: Mapping[str, ObjectLabel]
+    by_field: Mapping[str, ObjectLabel]
     labels: Sequence[ObjectLabel]
     wanted: Container[str]
     where: str
@@ -89,12 +89,12 @@ class Makers:
 
     def has(self, field: str) -> bool:
         """Return whether objects have a field, either always or on request."""
-        label = self.of[field]
+        label = self.by_field[field]
         return not label.on_request or label.name in self.wanted
 
     def label(self, field: str) -> ObjectLabel | None:
         """The label that restores a field; None for an unknown field, or a field that was not requested and does not follow."""
-        label = self.of.get(field)
+        label = self.by_field.get(field)
         return label if label and (label.follows or self.has(field)) else None
 
 
@@ -132,7 +132,7 @@ class _Restored(ObjectAnnotation):
         if name != "extra":
             return super().__getattr__(name)
         makers: Makers | None = self.__dict__.get("_makers")
-        beyond = [field for field in makers.of if field not in _OWN and makers.has(field)] if makers else []
+        beyond = [field for field in makers.by_field if field not in _OWN and makers.has(field)] if makers else []
         self.__dict__["extra"] = {}
         self.__dict__["extra"] = {field: getattr(self, field) for field in beyond}
         return self.__dict__["extra"]
@@ -140,7 +140,7 @@ class _Restored(ObjectAnnotation):
     def __dir__(self) -> list[str]:
         """Return all attributes, including those not restored yet."""
         makers: Makers = self.__dict__["_makers"]
-        return sorted({*object.__dir__(self), *_OWN, *filter(makers.has, makers.of)})
+        return sorted({*object.__dir__(self), *_OWN, *filter(makers.has, makers.by_field)})
 
     def __getstate__(self) -> dict[str, Any]:
         """Return every field, so that an object can be sent to other processes without its shot."""

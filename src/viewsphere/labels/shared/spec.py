@@ -212,7 +212,7 @@ class ObjectLabel(LabelSpec):
 
     @staticmethod
     def from_placement(
-        of: Callable[[Placement], Mapping[str, Any]],
+        fields_of: Callable[[Placement], Mapping[str, Any]],
         *,
         name: str,
         meaning: str,
@@ -228,7 +228,7 @@ class ObjectLabel(LabelSpec):
             meaning=meaning,
             fields=tuple(fields),
             axes=axes,
-            restore=lambda kept, placement, o: of(placement),
+            restore=lambda kept, placement, o: fields_of(placement),
             prove=prove,
             drawing=drawing,
             on_request=on_request,

@@ -79,7 +79,7 @@ class Grid:
     world_from_grid: NDArray[np.float64]
 
     @classmethod
-    def of(cls, options: Voxels, camera: Camera) -> Grid:
+    def for_camera(cls, options: Voxels, camera: Camera) -> Grid:
         """The grid of a camera's view."""
         (x, y), (fx, fy) = _middle(camera, options.distance), (0.0, 1.0)
         if options.axes == "view":
@@ -136,7 +136,7 @@ class Occupancy:
     corner: NDArray[np.float64]
 
     @classmethod
-    def of(cls, vertices: NDArray[np.float32], triangles: NDArray[np.int32], cells: int) -> Occupancy:
+    def from_mesh(cls, vertices: NDArray[np.float32], triangles: NDArray[np.int32], cells: int) -> Occupancy:
         """The cells of a mesh whose longest side is `cells` long; raises ValueError for less than 1 or too many."""
         if not 1 <= cells**3 <= limits.MAX_VOXELS:
             raise ValueError(f"occupancy: expected 1 to {limits.MAX_VOXELS:,} cells in all, found {cells} along each side")
@@ -183,7 +183,7 @@ class VoxelGrid:
     indoors: NDArray[np.bool_]
 
     @classmethod
-    def of(cls, runs: NDArray[Any], grid: Grid) -> Self:
+    def from_runs(cls, runs: NDArray[Any], grid: Grid) -> Self:
         """The cells of runs (N,) of `RUN`; raises ValueError if the grid has another number of cells."""
         count, filled = math.prod(grid.size), int(runs["length"].sum(dtype=np.uint64))
         if filled != count:

@@ -77,7 +77,7 @@ class Rig(Frozen):
         return (self.sensors[beside[0][0]].name, beside[0][1]) if beside else None
 
     @staticmethod
-    def of(intrinsics: Intrinsics) -> Rig:
+    def single(intrinsics: Intrinsics) -> Rig:
         """The rig of one camera with this lens."""
         return Rig(sensors=(Sensor(intrinsics=intrinsics),))
 

@@ -99,7 +99,7 @@ def shot(context: SamplingContext, subject: str, poses: Sequence[int], box_of: B
     if context.own_rig is not None or lens is None:
         return context.finished(key, first, things, scene, [now])
     finished = context.finished(key, first, things, scene, [now.model_copy(update={"intrinsics": None})])
-    return finished.model_copy(update={"rig": Rig.of(lens)})
+    return finished.model_copy(update={"rig": Rig.single(lens)})
 
 
 def _things(context: SamplingContext, shot: Arranged) -> tuple[Thing, ...]:

@@ -39,7 +39,7 @@ class Air:
     is_outdoors: bool = False
 
     @classmethod
-    def of(cls, fog: Fog, camera: Camera, rays: NDArray[np.floating] | None = None, is_outdoors: bool = False) -> Air:
+    def for_camera(cls, fog: Fog, camera: Camera, rays: NDArray[np.floating] | None = None, is_outdoors: bool = False) -> Air:
         """The air in front of a camera, along rays (N, 3) in its axes, by default through its pixel centres."""
         ray = np.nan_to_num(pixel_rays(camera.intrinsics).reshape(-1, 3) if rays is None else rays)
         length = np.sqrt((ray * ray).sum(axis=1))

@@ -98,7 +98,7 @@ class Completed(Exported):
     def _context(self, sample: Sample, names: list[str]) -> LabelContext:
         asked = [name for name in names if name in on_request()]
         compares = any(labels()[name].pose_offsets for name in names)
-        context = self.reconstructor.of(sample, names, asked, continued=compares)
+        context = self.reconstructor.context(sample, names, asked, continued=compares)
         if context is None:
             raise StoreError(
                 f"frame {sample.index}: expected scenery as it was rendered: {'; '.join(self.reconstructor.notes)}"

@@ -48,7 +48,7 @@ class Views:
         self._seen = cache(self._made)
         self._completed: Completed | None = None
 
-    def of(self, entry: FormatEntry, least: float | None) -> Dataset:
+    def for_format(self, entry: FormatEntry, least: float | None) -> Dataset:
         """The data set with the labels that a format needs, without annotations of objects whose visibility is at most `least`.
         A format that writes scenes keeps all annotations. Raises UserError for needs that cannot be met.
         """
@@ -139,7 +139,7 @@ def targets(dataset: Dataset, formats: Entries) -> tuple[Target, ...]:
     """The formats to be written from a data set."""
     views, least = Views(dataset), dataset.plan.keep_annotations_above
     specs = ((entry, folder, plugins.load(FormatSpec, entry.name)) for entry, folder in formats)
-    return tuple(Target(entry, folder, spec, views.of(entry, least)) for entry, folder, spec in specs)
+    return tuple(Target(entry, folder, spec, views.for_format(entry, least)) for entry, folder, spec in specs)
 
 
 def prepared(dataset: Dataset, found: Sequence[Target], workers: int = 0) -> Generator[dict[str, Any]]:
@@ -151,7 +151,7 @@ def prepared(dataset: Dataset, found: Sequence[Target], workers: int = 0) -> Gen
     workers = workers if shared and dataset.store.place.is_shared() else 0
     begun, lots, done, total = time.monotonic(), _lots(dataset.shots()), 0, len(dataset)
     for lot in lots:
-        yield from map(alone.of, _samples(dataset, lot))
+        yield from map(alone.parts, _samples(dataset, lot))
         done += sum(len(places) for _, places in lot)
         spent = time.monotonic() - begun
         if workers > 1 and spent >= PATIENCE_S and spent * (total - done) / done >= WORTH_S:
@@ -160,7 +160,7 @@ def prepared(dataset: Dataset, found: Sequence[Target], workers: int = 0) -> Gen
         for lot, (parts, kinds) in made:
             dataset.link_kinds |= kinds
             samples = _samples(dataset, lot) if own.preparers else repeat(None)
-            yield from (part | own.of(sample) for part, sample in zip(parts, samples, strict=False))
+            yield from (part | own.parts(sample) for part, sample in zip(parts, samples, strict=False))
 
 
 class _Preparation:
@@ -170,13 +170,13 @@ class _Preparation:
         self.preparers = {target.entry.name: target.preparer() for target in found}
         self._dataset = dataset
 
-    def of(self, sample: Any) -> dict[str, Any]:
+    def parts(self, sample: Any) -> dict[str, Any]:
         """Return the prepared data of a sample for each format."""
         return {name: prepare(sample) for name, prepare in self.preparers.items()}
 
     def __call__(self, lot: Lot) -> tuple[list[dict[str, Any]], set[str]]:
         """Return each format's prepared data for each sample of a lot, and the kinds of file links so far."""
-        return [self.of(sample) for sample in _samples(self._dataset, lot)], self._dataset.link_kinds
+        return [self.parts(sample) for sample in _samples(self._dataset, lot)], self._dataset.link_kinds
 
 
 def _preparation(dataset: Dataset, formats: Entries) -> _Preparation:

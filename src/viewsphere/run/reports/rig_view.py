@@ -70,7 +70,7 @@ def recipe_rig(recipe: Recipe) -> Rig:
         asked = recipe.camera.of_viewpoints
         views = poses_of(recipe.viewpoints, recipe.time, recipe.seed, recipe.folder) if asked else None
         own = lens(recipe, views)
-        return rig_of(recipe, own) or Rig.of(own)
+        return rig_of(recipe, own) or Rig.single(own)
 
 
 def sensor_facts(rig: Rig) -> tuple[SensorFacts, ...]:

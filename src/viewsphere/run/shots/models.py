@@ -135,7 +135,7 @@ class Models:
 
     def _deforming(self, spec: ModelSpec, steps: Steps) -> tuple[ModelInfo, Export]:
         """The record and export of a deforming model with all its time steps."""
-        model = DeformingMesh.of({frame: self.stages.model(spec, step) for frame, step in steps.items()})
+        model = DeformingMesh.from_meshes({frame: self.stages.model(spec, step) for frame, step in steps.items()})
         infos = tuple(replace(self._info(spec, model.meshes[f], step), track=spec.key) for f, step in steps.items())
         rest = next(info for info in infos if info.step == steps[_rest(spec)])
 

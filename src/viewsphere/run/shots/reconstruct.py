@@ -54,7 +54,7 @@ class ViewReconstructor:
         """The notes about changed scenery."""
         return self._scenery.notes
 
-    def of(
+    def context(
         self, sample: Sample, names: Iterable[str], asked: Iterable[str] = (), continued: bool = False
     ) -> LabelContext | None:
         """Return the view of a sample's sensor, for labels of these names and for the labels on request in `asked`.

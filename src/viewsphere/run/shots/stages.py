@@ -141,7 +141,7 @@ class Stages:
             stage: Stage = plugins.load(EngineSpec, shot.engine).staged(shot, self.model)
             self._stage_key = key
         else:
-            stage = self._stage.of(shot)
+            stage = self._stage.for_shot(shot)
         self._stage = stage
         return stage
 

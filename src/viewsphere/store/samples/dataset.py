@@ -223,12 +223,12 @@ class Dataset(Shown, Sequence[Sample]):
             raise UserError(f"{self.root}: select: {error}") from None
         if split is not None and split not in self.splits:
             raise UserError(f"{self.root}: select: split: {one_of(split, self.splits)}")
-        numbers = None if split is None and sensor is None else array("q", self.of(split, sensor))
+        numbers = None if split is None and sensor is None else array("q", self.positions(split, sensor))
         if sensor is not None and not numbers:
             raise UserError(f"{self.root}: select: sensor: expected one that took pictures; found {sensor!r}")
         return Selection(self.name, self, fields, numbers)
 
-    def of(self, split: str | None = None, sensor: str | None = None) -> Iterator[int]:
+    def positions(self, split: str | None = None, sensor: str | None = None) -> Iterator[int]:
         """Positions in the data set of the frames of a split and a sensor; reads all records.
 
         Args:
@@ -622,7 +622,7 @@ class Dataset(Shown, Sequence[Sample]):
         from viewsphere.model.annotations.voxels import Occupancy
 
         mesh = self.mesh(key)
-        return Occupancy.of(mesh.vertices, mesh.triangles, cells)
+        return Occupancy.from_mesh(mesh.vertices, mesh.triangles, cells)
 
     def model_files(self) -> Iterator[tuple[str, str]]:
         """Yield every finished model's OBJ, GLB, materials and textures. A model that deforms comes with all its time steps.

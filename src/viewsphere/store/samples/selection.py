@@ -27,13 +27,10 @@ class Selection(Sequence[dict[str, Any]]):
     memory does not grow, and workers receive it as the data set's path.
 
     Args:
-        dataset: The data set.
+        name: Name of the data set.
+        samples: The samples of the data set.
         fields: Names of fields; see `Dataset.select`.
-        split: Name of a split; None: all.
-        sensor: Name of a sensor; None: all.
-
-    Raises:
-        UserError: A field, split or sensor is not in the data set.
+        numbers: Positions of the selected samples, counted from 0; None: all.
     """
 
     def __init__(

@@ -300,7 +300,7 @@ class Store:
             folder.mkdir()
             yield folder
             if not (folder / MANIFEST).is_file():
-                Manifest.of(folder).write(folder)
+                Manifest.from_folder(folder).write(folder)
             if again and target.is_dir():
                 refuse_another(target, folder)
                 self.place.replace(folder, target)
@@ -319,7 +319,7 @@ class Store:
             folder.mkdir()
             yield folder
             if target.parent == self.folder / "models":
-                Manifest.of(folder).write(folder)
+                Manifest.from_folder(folder).write(folder)
             self.place.replace(folder, target)
 
     def write_file(self, name: str, text: str) -> None:

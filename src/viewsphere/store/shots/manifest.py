@@ -84,7 +84,7 @@ class Manifest:
     painter: str = ""
 
     @staticmethod
-    def of(folder: Path) -> Manifest:
+    def from_folder(folder: Path) -> Manifest:
         """Return the manifest of a folder and the folders below, without the manifest itself."""
         paths = sorted(path for path in folder.rglob("*") if path.is_file() and path != folder / MANIFEST)
         return Manifest({path.relative_to(folder).as_posix(): seal_of(path) for path in paths})

@@ -31,7 +31,7 @@ def points_on(view: View, count: int, rng: np.random.Generator, things: Sequence
         raise ValueError(f"points_on: expected things that have a surface, found {found}")
     thing = view.owners[picked]
     triangle = (picked - np.array(view.geometry.triangle_start)[thing]).astype(np.int32)
-    return SurfacePoints.of(view, thing, triangle, weights, np.zeros((count, 3)))
+    return SurfacePoints.from_weights(view, thing, triangle, weights, np.zeros((count, 3)))
 
 
 def points_on_model(view: View, i: int, count: int) -> Drawn:

@@ -40,7 +40,7 @@ class SurfacePoints:
     ground_z: float | None
 
     @staticmethod
-    def of(view: View, thing: Whole, triangle: Whole, weights: Float, place: Float) -> SurfacePoints:
+    def from_weights(view: View, thing: Whole, triangle: Whole, weights: Float, place: Float) -> SurfacePoints:
         """Points on a view's things: thing (N,) int32 is the position in its `things`, or a value as in `body` for points on no
         thing.
         """
@@ -112,7 +112,7 @@ def points_seen(view: View, xy: ArrayLike) -> SurfacePoints:
     weights[on] = weights_of(view, met[on], rays[on])
     triangle = np.where(on, met - first[np.maximum(thing, 0)], -1).astype(np.int32)
     directions = transform(view.world_from_camera, transform(view.camera_from_ray, rays))
-    return SurfacePoints.of(view, thing, triangle, weights, _fixed(view, thing, directions))
+    return SurfacePoints.from_weights(view, thing, triangle, weights, _fixed(view, thing, directions))
 
 
 def _fixed(view: View, thing: Whole, directions: Float) -> Float:

@@ -25,7 +25,7 @@ class Part:
     matrix: Float
 
     @staticmethod
-    def of(element: Any, path: str) -> Part:
+    def from_element(element: Any, path: str) -> Part:
         """The part that an `<item>` or `<component>` of the model file `path` names."""
         attributes = element.attrib
         place = posixpath.normpath(attributes.get("path", path).replace("\\", "/")).lstrip("/")
@@ -58,7 +58,7 @@ def objects_of(folder: ModelFolder, model: Any, path: str) -> dict[str, Object]:
     objects: dict[str, Object] = {}
     for element in model.iter("object"):
         mesh = next(element.iterfind("mesh"), None)
-        components = tuple(Part.of(part, path) for part in element.iterfind("components/component"))
+        components = tuple(Part.from_element(part, path) for part in element.iterfind("components/component"))
         triangles = None if mesh is None else _triangles(folder, element, mesh)
         objects[str(element.get("id"))] = Object(str(element.get("name") or "").strip()[:80], triangles, components)
     return objects

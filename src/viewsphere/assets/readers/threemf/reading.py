@@ -106,7 +106,11 @@ class _Package:
         """The items of the build; if it has none, all objects that are not components, with a warning."""
         path = self.root
         items = [
-            Part.of(item, path) for build in self.model(path) if build.tag == "build" for item in build if item.tag == "item"
+            Part.from_element(item, path)
+            for build in self.model(path)
+            if build.tag == "build"
+            for item in build
+            if item.tag == "item"
         ]
         if items:
             return items

@@ -31,14 +31,14 @@ def run(scene, told):
     """
     placed = {one[ORDER]: one for one in scene.objects if ORDER in one}
     objects = {placed[order]: known for order, known in enumerate(told["things"])}
-    before = _Standing.of(scene)
+    before = _Standing.from_scene(scene)
     space = {"__name__": "viewsphere_script", "__file__": told["file"]}
     try:
         exec(compile(told["text"], told["file"], "exec"), space)
         if not callable(space.get(ENTRY)):
             raise ValueError(f"expected a function {ENTRY}(scene, objects, shot), found none")
         space[ENTRY](scene, objects, told["shot"])
-        after = _Standing.of(scene)
+        after = _Standing.from_scene(scene)
     except BaseException as error:  # every exception is the script's error, including sys.exit
         lines = [frame.lineno for frame in traceback.extract_tb(error.__traceback__) if frame.filename == told["file"]]
         where = f", line {lines[-1]}" if lines else ""
@@ -58,7 +58,7 @@ class _Standing:
     """
 
     @classmethod
-    def of(cls, scene):
+    def from_scene(cls, scene):
         """Return the state of the scene now, as a render would show it whose camera is at `ELSEWHERE`."""
         made, resting = cls(scene), scene.camera.matrix_world.copy()
         scene.camera.matrix_world = ELSEWHERE

@@ -70,7 +70,7 @@ class TakenMap:
     taken: NDArray[np.bool_]
 
     @classmethod
-    def of(cls, gap: float, slim: float, reach: float) -> TakenMap:
+    def empty(cls, gap: float, slim: float, reach: float) -> TakenMap:
         """An empty map."""
         cell = max(2 * reach / CELLS, FINE * slim, LEAST)
         count = min(int(2 * reach / cell) + 1, CELLS)

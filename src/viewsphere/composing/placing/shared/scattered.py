@@ -54,7 +54,7 @@ def scattered(
         partial(outline, _seen_from_above(shape)) if of_hulls else partial(footprint, shape.box) for shape in shapes
     ]
     slims = {inner_class(cover(IDENTITY).circle.inner) for cover in covers}
-    others = Others(tuple(TakenMap.of(room.gap, slim, reach) for slim in sorted(slims)))
+    others = Others(tuple(TakenMap.empty(room.gap, slim, reach) for slim in sorted(slims)))
     for shape, pose in room.taken:
         others.add(outline(shape.vertices(), pose) if of_hulls else footprint(shape.box, pose))
     for slot, (spec, shape, cover) in enumerate(zip(cast, shapes, covers, strict=True)):

@@ -93,7 +93,7 @@ def edge_samples(
         pixels, position, triangle, inverse = _pinhole_edges(geometry, visibility, marks, q, owner, normals, behind)
         samples = Samples(pixels, position, np.zeros((0, 3), np.float32), triangle, inverse)
     else:
-        points = _Points.of(camera, marks[: visibility.triangle.size].reshape(visibility.triangle.shape), 4, 1)
+        points = _Points.from_marks(camera, marks[: visibility.triangle.size].reshape(visibility.triangle.shape), 4, 1)
         points.draw(geometry, q, np.zeros(len(geometry.triangles) + 1, np.bool_), np.arange(len(geometry.triangles)))
         known = np.zeros(0, np.float32)
         found = points.pixels[:-1], points.nearest.astype(np.float32), points.seen, known, _ROTATED
@@ -159,7 +159,7 @@ def layers(
         chosen = np.flatnonzero(kernels.touched_boxes(q, clear, geometry.triangles, reach, farthest))
     else:
         chosen = _touched(
-            _Points.of(camera, (farthest != kernels_chosen.CLOSED).view(np.uint8), count, 1), geometry, q, see_through
+            _Points.from_marks(camera, (farthest != kernels_chosen.CLOSED).view(np.uint8), count, 1), geometry, q, see_through
         )
     stacks: list[list[Layer]] = []
     step = POINTS_AT_ONCE // count
@@ -168,7 +168,7 @@ def layers(
         rows = part if pixels is None else row_of[part]
         marks = np.zeros(shape, np.uint8)
         marks.reshape(-1)[part] = 1
-        points = _Points.of(camera, marks, count, MOST_LAYERS)
+        points = _Points.from_marks(camera, marks, count, MOST_LAYERS)
         _pile(points, geometry, q, see_through, clear, (shown[0][rows], shown[1][rows]))
         slots = (rows[:, None] * count + np.arange(count)).reshape(-1).astype(np.int32)
         stacks.append(_sorted(points, slots))
@@ -247,7 +247,7 @@ class _Points:
     counts: NDArray[np.uint8]
 
     @classmethod
-    def of(cls, camera: Camera, marks: NDArray[np.uint8], count: int, capacity: int) -> _Points:
+    def from_marks(cls, camera: Camera, marks: NDArray[np.uint8], count: int, capacity: int) -> _Points:
         """The marked pixels, with `count` points each, and room for up to `capacity` see-through surfaces per point."""
         grid, pixels = kernels_chosen.numbered(marks)
         n = len(pixels) - 1

@@ -57,7 +57,7 @@ class BounceScenes:
 
     _last: list[_Throwing] = field(default_factory=list[_Throwing])
 
-    def of(
+    def find(
         self,
         arranged: Arranged,
         rows: Rows,

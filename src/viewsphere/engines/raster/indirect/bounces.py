@@ -302,7 +302,7 @@ def _gathering(
     """Return the gathering of light on flat surfaces and beside them, None if there are no such surfaces."""
     if seen.look is None or seen.around is None:
         return None
-    return FinalGather.of(seen.look, seen.around, seen.patches, surrounding, seen.tree, emissive, TURNS, emitted, off)
+    return FinalGather.from_patches(seen.look, seen.around, seen.patches, surrounding, seen.tree, emissive, TURNS, emitted, off)
 
 
 def _on_ground(

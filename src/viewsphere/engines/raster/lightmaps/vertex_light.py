@@ -129,7 +129,7 @@ def vertex_light_of(
     which, corners, longest = which[own], corners[own], longest[own]
     facing = np.ascontiguousarray(normals[which])
     size = max(CELL / unit, float(np.sqrt(2 * area[own].sum() / MOST)), float(np.ptp(corners, axis=(0, 1)).max()) / 500_000)
-    grid = _Grid.of(corners, facing, longest, size)
+    grid = _Grid.from_corners(corners, facing, longest, size)
     facets = _facets(vertices, triangles, which, corners, facing, grid.parts)
     ways, met, far = look_near(tree, facets.places, facets.normals, NEAR * grid.cell, unit)
     each, counted = np.arange(len(facets.places), dtype=np.int32), np.empty(len(facets.places), np.float32)
@@ -154,7 +154,7 @@ class _Grid:
     parts: NDArray[np.int64]
 
     @classmethod
-    def of(cls, corners: Float32, normals: Float32, longest: Float32, cell: float) -> _Grid:
+    def from_corners(cls, corners: Float32, normals: Float32, longest: Float32, cell: float) -> _Grid:
         low, all_ = corners.min(axis=(0, 1)).astype(np.float32), np.ones(len(corners))
         while True:
             parts = np.clip(np.ceil(longest / (LONG * cell)), 1, MOST_PARTS).astype(np.int64)

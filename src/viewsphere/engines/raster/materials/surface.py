@@ -94,7 +94,7 @@ class Rows:
     _written: NDArray[np.bool_]
 
     @classmethod
-    def of(cls, geometry: Geometry, meshes: Sequence[Mesh], materials: Materials, lengths: Lengths) -> Rows:
+    def from_geometry(cls, geometry: Geometry, meshes: Sequence[Mesh], materials: Materials, lengths: Lengths) -> Rows:
         """The rows of all triangles of a geometry and of the meshes it was built from; `materials` is the result of
         `pack_materials` for these.
         """

@@ -94,7 +94,7 @@ def paint(
     baked.rows.write_seen(camera, visibility, baked.geometry)
     view = view_of(baked, camera)
     triangle, depth = visibility.triangle.reshape(-1), visibility.inverse_depth.reshape(-1)
-    air = None if fog is None else Air.of(fog, camera, is_outdoors=is_outdoors)
+    air = None if fog is None else Air.for_camera(fog, camera, is_outdoors=is_outdoors)
     stack = shade_all(baked, camera, view, visibility, triangle, depth, radiance, split, air=air, more=more)
     if has_sky:
         _lay_sky(view, baked.surrounding, radiance, air)
@@ -153,7 +153,7 @@ def _smooth(
     own = Samples(samples.pixels[rows], places, rays, triangle, inverse)
     view = view_of(baked, camera, own)
     colors, parts = np.empty((count, 4), np.float32), np.zeros((count if len(split) else 0, split.shape[1]), np.float32)
-    air = None if fog is None else Air.of(fog, camera, _rays(camera, own), is_outdoors)
+    air = None if fog is None else Air.for_camera(fog, camera, _rays(camera, own), is_outdoors)
     shade_all(baked, camera, view, visibility, own.triangle, own.inverse_depth, colors, parts, own, air)
     if has_sky:
         colors[is_other, 3] = 1  # the sky need not be looked up for these

@@ -39,7 +39,7 @@ class StillMaps:
     _maps: dict[Key, Float32] = field(default_factory=dict[Key, Float32])
 
     @classmethod
-    def of(cls, part: Callable[[int], Surfaces], count: int, moving: Sequence[int], targets: int) -> StillMaps:
+    def for_things(cls, part: Callable[[int], Surfaces], count: int, moving: Sequence[int], targets: int) -> StillMaps:
         """The maps for `count` things and the ground, whose surfaces `part` gives, with the indices of the `moving` things;
         things after the first `targets` are scenery.
         """

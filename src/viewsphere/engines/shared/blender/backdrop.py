@@ -37,7 +37,7 @@ class Backdrop:
     ground: int
 
     @classmethod
-    def of(cls, shot: Shot, geometry: Geometry) -> Backdrop:
+    def for_shot(cls, shot: Shot, geometry: Geometry) -> Backdrop:
         """The backdrop of a shot. Raises RecipeError for a picture that cannot be read."""
         scene = shot.scene
         sky = sky_pictures(scene.sky, scene.sun, scene.lights, scene.ground is not None)
@@ -107,14 +107,14 @@ def veil(picture: Float32, fog: Fog, camera: Camera, geometry: Geometry, is_outd
     """
     seen = rasterize(geometry, camera, subdivision=2)
     rays = pixel_rays(camera.intrinsics, 2).reshape(-1, 3)
-    depth = Air.of(fog, camera, rays).depth(seen.inverse_depth.reshape(-1))
+    depth = Air.for_camera(fog, camera, rays).depth(seen.inverse_depth.reshape(-1))
     triangle = seen.triangle.reshape(-1)
     if is_outdoors:
         depth = np.where(triangle >= geometry.triangle_start[-1], depth, np.float32(0))
     is_there = triangle >= 0
     through, there = (_of_pixels(values, camera) for values in (np.exp(-depth) * is_there, is_there.astype(np.float32)))
     mean = np.where(there > 0, through / np.maximum(there, np.float32(0.25)), 0)
-    Air.of(fog, camera).veil(picture.reshape(-1, 4), -np.log(np.maximum(mean, np.float32(1e-30))))
+    Air.for_camera(fog, camera).veil(picture.reshape(-1, 4), -np.log(np.maximum(mean, np.float32(1e-30))))
 
 
 def lay_sky(picture: Float32, fog: Fog, camera: Camera, backdrop: Backdrop | None) -> None:
@@ -126,7 +126,7 @@ def lay_sky(picture: Float32, fog: Fog, camera: Camera, backdrop: Backdrop | Non
         rays = np.nan_to_num(pixel_rays(camera.intrinsics)) @ camera.R
         directions = rays / np.maximum(np.linalg.norm(rays, axis=2, keepdims=True), 1e-12)
         sky = (1 - hidden[:, None]) * backdrop.seen(directions).reshape(-1, 3).astype(np.float32)
-    rows[:, :3] += Air.of(fog, camera).behind(sky, hidden)
+    rows[:, :3] += Air.for_camera(fog, camera).behind(sky, hidden)
     rows[:, 3] = 1
 
 

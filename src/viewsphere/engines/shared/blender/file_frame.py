@@ -23,7 +23,7 @@ class FileFrame:
     unit: float
 
     @classmethod
-    def of(cls, blend: BlendScene | None) -> FileFrame:
+    def from_blend(cls, blend: BlendScene | None) -> FileFrame:
         """The frame of the .blend file; the identity without a file."""
         if blend is None:
             return cls(np.eye(4), 1.0)

@@ -33,7 +33,7 @@ def indices(shot: Shot, instant: int, sensor: int, load: Load) -> NDArray[np.int
     python = shot.engine_options.get("python") if shot.engine == "cycles" else None
     options = {"python": python, "samples": 1, "bounces": 0, "denoise": "off", "settings": SHARP}
     stage = build_stage(shot.model_copy(update={"engine": "cycles", "engine_options": options}), load).arrangement(instant)
-    view = FileFrame.of(shot.scene.blend).camera(camera_request(camera))
+    view = FileFrame.from_blend(shot.scene.blend).camera(camera_request(camera))
     try:
         return stage.keeper.insist(partial(_rendered, stage, view), stage.named)
     except BlenderError as error:

@@ -140,7 +140,7 @@ class Sweeping:
         if exposure is None:
             return None
         moments = (np.linspace(-0.5, 0.5, MOMENTS) * self.shot.shutter).tolist()
-        frame = FileFrame.of(self.shot.scene.blend)
+        frame = FileFrame.from_blend(self.shot.scene.blend)
         sweeps = [exposure.things[i] for i in staged(self.shot.things_at(self.instant), self.shot.scene)]
         objects = [
             {"object": place, "matrices": [frame.placed(pose) for pose in map(sweep.pose, moments) if pose is not None]}

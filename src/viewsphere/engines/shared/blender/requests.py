@@ -57,7 +57,7 @@ def scene_request(
 
     Raises UserError for a picture of sky or ground that cannot be read.
     """
-    frame, blend = FileFrame.of(scene.blend), scene.blend
+    frame, blend = FileFrame.from_blend(scene.blend), scene.blend
     kinds = kinds_of(things, meshes, scene)
     shared: dict[int, Request] = {}
     meshes_told: list[Request] = []

@@ -106,7 +106,7 @@ def _request(shot: Shot, samples: Sequence[Sample], finishes: Sequence[Finish], 
     return {
         "name": name,
         "text": TEXT.format(name=name, data=data),
-        "poses": _poses_request(samples, FileFrame.of(shot.scene.blend)),
+        "poses": _poses_request(samples, FileFrame.from_blend(shot.scene.blend)),
         "objects": _objects_request(samples),
         "members": members_of(shot),
         "properties": {"data set": data, "frames": [sample.index for sample in samples]},

@@ -172,9 +172,9 @@ class CyclesStage:
         """The shot that this stage paints."""
         return self.arrangements.shot
 
-    def of(self, shot: Shot) -> CyclesStage:
+    def for_shot(self, shot: Shot) -> CyclesStage:
         """A stage for another shot with an equal `stage_key`, which shares the loaded meshes."""
-        return replace(self, arrangements=self.arrangements.of(shot))
+        return replace(self, arrangements=self.arrangements.for_shot(shot))
 
     def at(self, instant: int) -> Geometry:
         """The world-space triangles at an instant, counted from 0 in the shot."""
@@ -300,7 +300,7 @@ class Arrangement:
     @cached_property
     def sky(self) -> Backdrop | None:
         """The sky and the ground's fading; None if the scene is a user's own."""
-        return None if self.shot.scene.blend is not None else Backdrop.of(self.shot, self.geometry)
+        return None if self.shot.scene.blend is not None else Backdrop.for_shot(self.shot, self.geometry)
 
     def _radiance(
         self, camera: Camera, is_open: bool, clip: Clip = (NEAREST, FARTHEST), sweeping: Sweeping | None = None
@@ -347,7 +347,7 @@ class Arrangement:
             shape = camera.height, camera.width
             return {name: np.zeros((*shape, COMPONENTS[name]), np.float32) for name in ("picture", *wanted)}
         out = process.folder / "picture.npy"
-        request = FileFrame.of(self.shot.scene.blend).camera(camera_request(camera, clip))
+        request = FileFrame.from_blend(self.shot.scene.blend).camera(camera_request(camera, clip))
         told: Request = {"transparent": is_open, "border": border, "passes": list(wanted), "blur": blur}
         told["least"] = self.shot.label_alpha
         try:

@@ -19,7 +19,7 @@ class Numbered:
     own: Mapping[int, str]
 
     @classmethod
-    def of(
+    def from_classes(
         cls,
         classes: Iterable[SemanticClass],
         stuff: Mapping[str, int],

@@ -91,7 +91,7 @@ class Tree(ABC):
         return "/".join((sample.split or "all", *([] if folder is None else [f"{folder:04d}"]), f"{sample.index:08d}"))
 
     @abstractmethod
-    def of(self, sample: Sample) -> Iterator[File | Piece]:
+    def sample_files(self, sample: Sample) -> Iterator[File | Piece]:
         """Yield the files and pieces that a sample adds. Samples may come in any order, in several processes; their pieces are
         joined in the order of frames.
         """
@@ -126,7 +126,7 @@ def functions(kind: type[Tree]) -> Functions:
         def prepare(sample: Sample) -> list[Piece]:
             pieces: list[Piece] = []
             with _lacking_told(tree, sample):
-                for one in tree.of(sample):
+                for one in tree.sample_files(sample):
                     if isinstance(one, Piece):
                         pieces.append(one)
                     else:
@@ -179,7 +179,7 @@ def _nowhere(pieces: list[Piece]) -> None:
 
 def _expected(tree: Tree, add: Callable[[list[Piece]], None]) -> Iterator[Expected]:
     for sample in tree.dataset:
-        for one in tree.of(sample):
+        for one in tree.sample_files(sample):
             if isinstance(one, Piece):
                 add([one])
             else:

@@ -100,7 +100,7 @@ class SamplingContext(Sendable):
     @cached_property
     def rig(self) -> Rig:
         """The sensors of all shots."""
-        return self.own_rig or Rig.of(lens(self.recipe, self.pose_list))
+        return self.own_rig or Rig.single(lens(self.recipe, self.pose_list))
 
     @property
     def intrinsics(self) -> Intrinsics:

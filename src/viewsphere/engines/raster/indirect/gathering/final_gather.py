@@ -39,7 +39,7 @@ class Spots(NamedTuple):
     counted: Float32
 
     @classmethod
-    def of(
+    def from_rays(
         cls,
         tree: Tree,
         origins: Float32,
@@ -144,7 +144,7 @@ def look(
     if charts is None:
         return None
     ways, frame = (charts.directions, charts.turn), (charts.local, charts.axes)
-    nodes = Spots.of(tree, charts.origins, ways, frame, normals, charts.cell, is_inside_out)
+    nodes = Spots.from_rays(tree, charts.origins, ways, frame, normals, charts.cell, is_inside_out)
     nodes.counted[~charts.reached] = 0
     found = vertex_light_of(
         tree, vertices, triangles, np.flatnonzero(charts.chart < 0), normals, unit, SITE_RAYS * more, is_inside_out
@@ -154,7 +154,9 @@ def look(
     sites, facets = found
     ways, frame = (sites.directions, np.arange(len(sites.origins), dtype=np.int32)), (sites.local, sites.axes)
     return Look(
-        charts, nodes, Round(sites, facets, Spots.of(tree, sites.origins, ways, frame, normals, sites.cell, is_inside_out))
+        charts,
+        nodes,
+        Round(sites, facets, Spots.from_rays(tree, sites.origins, ways, frame, normals, sites.cell, is_inside_out)),
     )
 
 
@@ -170,7 +172,7 @@ class FinalGather(NamedTuple):
     afar: tuple[Float32, ...]
 
     @classmethod
-    def of(
+    def from_patches(
         cls,
         look: Look,
         around: PatchRays,
