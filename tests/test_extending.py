@@ -134,11 +134,11 @@ def test_a_label_of_pixels_is_one_file(labelled, tmp_path):
 ASPECT = """
 from viewsphere.labels import Field, ObjectLabel
 
-def fields(placement):
+def of_box(placement):
     low, high = placement.box.min(axis=0), placement.box.max(axis=0)
     return {"aspect": float((high - low)[2] / (high - low)[0])}
 
-LABEL = ObjectLabel.from_placement(fields, name="aspect", meaning="how tall", fields=(Field("aspect", "height over width", float),))
+LABEL = ObjectLabel.from_placement(of_box, name="aspect", meaning="tall", fields=(Field("aspect", "height over width", float),))
 """
 
 

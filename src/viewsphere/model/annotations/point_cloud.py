@@ -51,7 +51,9 @@ class PointCloud:
         return len(self.points)
 
     @classmethod
-    def from_channels(cls, channels: Channels, camera: Camera, categories: Mapping[int, int], axes: Axes, surface: Surface) -> PointCloud:
+    def from_channels(
+        cls, channels: Channels, camera: Camera, categories: Mapping[int, int], axes: Axes, surface: Surface
+    ) -> PointCloud:
         """Return the points of a camera's channels; see `Sample.point_cloud`. `categories`: of the objects, by their ids.
 
         Raises ValueError for a missing channel.
