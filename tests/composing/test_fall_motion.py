@@ -38,20 +38,20 @@ def test_things_fall_as_fast_as_they_do_and_end_where_they_are_placed(scale):
     shapes = solids(3, scale=scale)
     found, rest = ways(shapes, drop=2.0 * scale)
     for way, pose in zip(found, rest, strict=True):
-        np.testing.assert_allclose(way.at(way.seconds[-1]), pose, atol=2e-6 * max(1, scale))
-        assert way.at(1e9) == way.at(way.seconds[-1]) and way.at(-1) == way.at(0)
-        start, early = np.array(way.at(0.0)), 0.3 * (scale**0.5)
+        np.testing.assert_allclose(way.pose_at(way.seconds[-1]), pose, atol=2e-6 * max(1, scale))
+        assert way.pose_at(1e9) == way.pose_at(way.seconds[-1]) and way.pose_at(-1) == way.pose_at(0)
+        start, early = np.array(way.pose_at(0.0)), 0.3 * (scale**0.5)
         seconds = np.linspace(0, early, 7)
-        heights = np.array([way.at(t)[2][3] for t in seconds])
+        heights = np.array([way.pose_at(t)[2][3] for t in seconds])
         np.testing.assert_allclose(heights, start[2, 3] - 9.81 / 2 * seconds**2, atol=0.01 * scale)
 
 
 def test_a_way_is_straight_between_its_states():
     way = Way((0.0, 1.0, 3.0), ((0, 0, 0, 1, 0, 0, 0), (0, 0, 1, 1, 0, 0, 0), (2, 0, 1, 0, 0, 0, 1)))
-    assert way.at(0.25)[2][3] == 0.25 and way.at(2.0)[0][3] == 1.0
-    np.testing.assert_allclose(np.array(way.at(2.0))[:3, :3], [[0, -1, 0], [1, 0, 0], [0, 0, 1]], atol=1e-12)
+    assert way.pose_at(0.25)[2][3] == 0.25 and way.pose_at(2.0)[0][3] == 1.0
+    np.testing.assert_allclose(np.array(way.pose_at(2.0))[:3, :3], [[0, -1, 0], [1, 0, 0], [0, 0, 1]], atol=1e-12)
     up = ((1.0, 0.0, 0.0, 0.0), (0.0, 1.0, 0.0, 0.0), (0.0, 0.0, 1.0, 5.0), (0.0, 0.0, 0.0, 1.0))
-    assert Carried(way, up, IDENTITY).at(1.0)[2][3] == 6.0
+    assert Carried(way, up, IDENTITY).pose_at(1.0)[2][3] == 6.0
 
 
 def test_what_is_caught_in_flight_is_not_in_anything_and_some_of_it_in_the_air():

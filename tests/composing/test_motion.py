@@ -44,13 +44,13 @@ def start(key="car_000", seed=0, **fields):
 
 
 def moved(*options, times=TIMES, **fields):
-    return mover(entries(*options), start(**fields)).at(times)
+    return mover(entries(*options), start(**fields)).motion_at(times)
 
 
 def poses(*options, times=TIMES, **fields):
     """The poses at these times, (T, 4, 4), of a thing that is there all the time."""
     made = moved(*options, times=times, **fields)
-    found = np.array([made.at(i) for i in range(len(times))])
+    found = np.array([made.pose_at(i) for i in range(len(times))])
     for pose in found:
         np.testing.assert_allclose(pose[:3, :3] @ pose[:3, :3].T, np.eye(3), atol=1e-9)
         assert np.linalg.det(pose[:3, :3]) > 0
@@ -70,7 +70,7 @@ def angles(rotations):
 
 
 def test_without_motions_things_stand_still():
-    assert mover(None, start()).at(TIMES).poses == (PLACED,)
+    assert mover(None, start()).motion_at(TIMES).poses == (PLACED,)
 
 
 def test_constant_is_a_line_and_a_turn_about_one_axis():
@@ -233,7 +233,7 @@ def test_a_path_waits_or_is_left_at_its_ends():
     y = poses(one)[:, 1, 3]
     np.testing.assert_allclose(y, np.clip(4 * TIMES - 2, 0, 4), atol=1e-9)
     gone = moved({**one, "end": "leave"})
-    assert [i for i in range(len(TIMES)) if gone.at(i) is None] == [i for i, t in enumerate(TIMES) if not 0.5 <= t <= 1.5]
+    assert [i for i in range(len(TIMES)) if gone.pose_at(i) is None] == [i for i, t in enumerate(TIMES) if not 0.5 <= t <= 1.5]
 
 
 def test_lanes_are_followed_in_their_direction():
@@ -302,11 +302,11 @@ def test_a_list_moves_what_the_motions_before_moved():
 
 def test_things_enter_and_leave():
     made = moved({"kind": "constant", "velocity": [1, 0, 0], "enter": 0.5, "leave": 1.5})
-    there = [made.at(i) is not None for i in range(len(TIMES))]
+    there = [made.pose_at(i) is not None for i in range(len(TIMES))]
     assert there == [0.5 <= time < 1.5 for time in TIMES]
-    assert made.at(25) == moved({"kind": "constant", "velocity": [1, 0, 0]}).at(25)
+    assert made.pose_at(25) == moved({"kind": "constant", "velocity": [1, 0, 0]}).pose_at(25)
     two = moved({"kind": "constant", "enter": 0.5}, {"kind": "clip", "leave": 1.0}, timeline=WALK)
-    assert [two.at(i) is not None for i in range(len(TIMES))] == [0.5 <= time < 1.0 for time in TIMES]
+    assert [two.pose_at(i) is not None for i in range(len(TIMES))] == [0.5 <= time < 1.0 for time in TIMES]
     assert {step.frame for step in two.steps} == set(range(13, 25)) and None not in two.steps
     assert moved({"kind": "constant", "enter": 9}).poses == (None,)
 
@@ -347,7 +347,7 @@ def test_options_are_drawn_for_each_name():
 def test_poses_do_not_depend_on_which_times_are_asked_for(one):
     there = {"lanes": LANES, "timeline": WALK}
     whole, single = moved(one, **there), [moved(one, times=[time], **there) for time in TIMES]
-    assert [whole.at(i) for i in range(len(TIMES))] == [one.at(0) for one in single]
+    assert [whole.pose_at(i) for i in range(len(TIMES))] == [one.pose_at(0) for one in single]
     assert [whole.step_at(i) for i in range(len(TIMES))] == [one.step_at(0) for one in single]
 
 

@@ -44,7 +44,7 @@ def part(motion, instants):
 @pytest.mark.parametrize("options", SEVERAL.values(), ids=SEVERAL)
 def test_instants_are_those_of_the_whole_sequence(options):
     moving = made(options)
-    whole = moving.mover.at([TIME.seconds_at(i) for i in range(TIME.count)])
+    whole = moving.mover.motion_at([TIME.seconds_at(i) for i in range(TIME.count)])
     assert moving.is_still == whole.is_still
     for instants in ([0], [59], [12, 13, 14], [0, 30, 59], list(range(60))):
         assert moving.during(instants) == part(whole, instants)

@@ -52,7 +52,7 @@ def test_a_car_follows_the_lane_of_a_turned_place():
         lanes=place_lanes(made, made.scene.place, ()),
     )
     entry = recipe(models=[{"source": "zoo:car", "motion": {"kind": "path", "lane": "right", "speed": 10}}]).models[0].motion
-    first, last = (np.array(pose) for pose in mover(entry, start).at([0.0, 2.0]).poses)
+    first, last = (np.array(pose) for pose in mover(entry, start).motion_at([0.0, 2.0]).poses)
     np.testing.assert_allclose(last[:3, 3] - first[:3, 3], [-20, 0, 0], atol=1e-9)  # +Y, turned by 90 degrees
     np.testing.assert_allclose(-last[:3, 1], [-1, 0, 0], atol=1e-9)
     assert last[1, 3] == pytest.approx(lanes()[0].points[0][0]) and last[2, 3] == 0

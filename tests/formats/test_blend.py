@@ -287,4 +287,4 @@ def test_each_sensor_of_a_rig_has_files_of_its_own(asked, world, request, tmp_pa
             assert camera.intrinsics == cameras[sample.index].intrinsics
             for thing in told.shot.objects:
                 there = {o.id: o.world_from_object for o in sample.objects}
-                np.testing.assert_array_equal(thing.motion.at(0), there[thing.id])
+                np.testing.assert_array_equal(thing.motion.pose_at(0), there[thing.id])

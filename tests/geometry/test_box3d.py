@@ -36,5 +36,5 @@ def test_corners_are_found_by_their_sides_wherever_the_box_is():
     moved = Box3d(transform(motion, BOX.corners))
     sides = [(-1, -1, 1), (1, 1, -1)]
     expected = transform(motion, np.array([(-1.0, -2.0, 6.0), (4.0, 5.0, -3.0)]))
-    assert np.array_equal(moved.at(sides), expected)
+    assert np.array_equal(moved.corners_at(sides), expected)
     np.testing.assert_allclose(moved.center, transform(motion, BOX.center[None])[0], atol=1e-12)

@@ -22,7 +22,7 @@ def brute(curve, first, last, steps=200_000):
 def test_two_points_are_a_line():
     curve = spline([[0, 0, 0], [3, 4, 0]])
     assert curve.length == pytest.approx(5, abs=1e-14)
-    np.testing.assert_allclose(curve.at([0, 1, 2.5, 5]), [[0, 0, 0], [0.6, 0.8, 0], [1.5, 2, 0], [3, 4, 0]], atol=1e-14)
+    np.testing.assert_allclose(curve.points_at([0, 1, 2.5, 5]), [[0, 0, 0], [0.6, 0.8, 0], [1.5, 2, 0], [3, 4, 0]], atol=1e-14)
     np.testing.assert_allclose(curve.direction(3.3), [0.6, 0.8, 0], atol=1e-15)
 
 
@@ -30,7 +30,7 @@ def test_points_of_a_line_give_the_line_however_they_are_spaced():
     x = np.array([0, 0.1, 5, 5.2, 9.0])
     curve = spline(np.stack([x, 0 * x, 0 * x], axis=1))
     s = np.linspace(0, 9, 101)
-    np.testing.assert_allclose(curve.at(s)[:, 0], s, atol=1e-12)
+    np.testing.assert_allclose(curve.points_at(s)[:, 0], s, atol=1e-12)
 
 
 @pytest.mark.parametrize("closed", [False, True])
@@ -39,7 +39,7 @@ def test_passes_its_points_at_its_knots(closed):
     curve = spline(points, closed)
     there = np.concatenate([points, points[:1]]) if closed else points
     assert curve.knots.shape == (len(there),)
-    np.testing.assert_allclose(curve.at(curve.knots), there, atol=1e-9)
+    np.testing.assert_allclose(curve.points_at(curve.knots), there, atol=1e-9)
 
 
 @pytest.mark.slow
@@ -57,26 +57,26 @@ def test_length_is_the_length_of_short_chords(seed, closed):
 def test_equal_steps_of_length_are_equally_long(seed):
     curve = spline(np.random.default_rng(seed).normal(size=(6, 3)) * 10)
     s = np.linspace(0.001, curve.length - 0.001, 500)
-    speed = np.linalg.norm(curve.at(s + 1e-4) - curve.at(s - 1e-4), axis=1) / 2e-4
+    speed = np.linalg.norm(curve.points_at(s + 1e-4) - curve.points_at(s - 1e-4), axis=1) / 2e-4
     assert np.abs(speed - 1).max() < 1e-6
-    ahead = (curve.at(s + 1e-4) - curve.at(s - 1e-4)) / 2e-4
+    ahead = (curve.points_at(s + 1e-4) - curve.points_at(s - 1e-4)) / 2e-4
     np.testing.assert_allclose(curve.direction(s), ahead, atol=1e-5)
 
 
 def test_a_closed_curve_goes_around_and_an_open_one_ends():
     points = [[0, 0, 0], [4, 0, 0], [4, 4, 0], [0, 4, 0]]
     around, there = spline(points, closed=True), spline(points)
-    np.testing.assert_allclose(around.at(1.5 + 2 * around.length), around.at(1.5), atol=1e-9)
-    np.testing.assert_allclose(around.at(-0.5), around.at(around.length - 0.5), atol=1e-9)
-    np.testing.assert_allclose(there.at([-1, there.length + 1]), [points[0], points[-1]], atol=1e-12)
+    np.testing.assert_allclose(around.points_at(1.5 + 2 * around.length), around.points_at(1.5), atol=1e-9)
+    np.testing.assert_allclose(around.points_at(-0.5), around.points_at(around.length - 0.5), atol=1e-9)
+    np.testing.assert_allclose(there.points_at([-1, there.length + 1]), [points[0], points[-1]], atol=1e-12)
 
 
 def test_a_closed_curve_of_a_regular_polygon_turns_alike_at_every_point():
     angles = np.arange(12) * np.pi / 6
     curve = spline(np.stack([np.cos(angles), np.sin(angles)], axis=1), closed=True)
     np.testing.assert_allclose(np.diff(curve.knots), curve.length / 12, rtol=1e-12)
-    assert np.abs(np.linalg.norm(curve.at(np.linspace(0, curve.length, 400)), axis=1) - 1).max() < 2e-3
-    assert np.abs((curve.at(curve.knots) * curve.direction(curve.knots)).sum(axis=1)).max() < 1e-12
+    assert np.abs(np.linalg.norm(curve.points_at(np.linspace(0, curve.length, 400)), axis=1) - 1).max() < 2e-3
+    assert np.abs((curve.points_at(curve.knots) * curve.direction(curve.knots)).sum(axis=1)).max() < 1e-12
 
 
 @pytest.mark.parametrize(

@@ -147,7 +147,7 @@ def test_motions_say_what_stays():
     assert Motion(steps=(step, None)).held(1) == Motion()
     assert Motion(poses=(IDENTITY, None), steps=(step,)).held(1) == Motion(poses=(None,), steps=(step,))
     body = Thing(id=1, model=ModelSpec(key="a", source="a.fbx", category="x", category_id=1), motion=Motion(steps=(None, step)))
-    assert (body.key, body.at(1).key) == ("a", "a-f0003")
+    assert (body.key, body.still_at(1).key) == ("a", "a-f0003")
 
 
 # Data sets.

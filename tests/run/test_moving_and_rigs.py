@@ -113,11 +113,11 @@ def proved(shot: Shot, samples) -> None:
         assert (sample.instances != ids).mean() < 2e-3  # rays along an outline
         same = (sample.instances == ids) & (ids > 0)
         assert np.abs(sample.depth[same] / depth[same] - 1).max() < 1e-4
-        there = {thing.id for thing in shot.things if thing.motion.at(instant) is not None}
+        there = {thing.id for thing in shot.things if thing.motion.pose_at(instant) is not None}
         assert [o.id for o in sample.objects] == sorted(there)
         for o in sample.objects:
             assert np.array_equal(o.mask, sample.instances == o.id) and o.area == o.mask.sum() > 15
-            np.testing.assert_allclose(o.world_from_object, shot.things[o.id - 1].motion.at(instant), atol=1e-12)
+            np.testing.assert_allclose(o.world_from_object, shot.things[o.id - 1].motion.pose_at(instant), atol=1e-12)
             np.testing.assert_allclose(o.camera_from_object[:3, :3], camera.R @ o.world_from_object[:3, :3], atol=1e-12)
             world = sample.coordinates[o.mask].astype(float) @ o.world_from_object[:3, :3].T + o.world_from_object[:3, 3]
             seen = (world @ camera.R.T + camera.t)[:, 2]

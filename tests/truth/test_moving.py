@@ -72,7 +72,7 @@ def test_what_moved_is_what_is_built_there(seed):
             poses[i] = None if what < 0.12 else pose(rng) if what < 0.8 else poses[i]
             meshes[i] = others[i] if 0.8 < what < 0.84 else deformed(meshes[i], rng) if what > 0.85 else meshes[i]
         things = [thing(i, where, scenery=i == 4) for i, where in enumerate(poses)]
-        same(ring.at(things, list(meshes), floor), things, meshes, ground, floor)
+        same(ring.geometry_at(things, list(meshes), floor), things, meshes, ground, floor)
 
 
 def walk(count, standing=pose(np.random.default_rng(5))):
@@ -87,7 +87,7 @@ DEEP = Floor(height=-50000.0)
 def test_as_many_instants_as_there_are_rooms_live_at_once_and_share_what_stays():
     ring, steps = Ring(True, 0.3), walk(ROOMS + 4)
     for first in range(len(steps) - ROOMS + 1):
-        now = [ring.at(things, MESHES) for things in steps[first : first + ROOMS]]
+        now = [ring.geometry_at(things, MESHES) for things in steps[first : first + ROOMS]]
         for geometry, things in zip(now, steps[first:], strict=False):
             same(geometry, things, MESHES, True, None)
         for name in HELD:
@@ -101,7 +101,7 @@ def test_what_deforms_leaves_the_instants_around_it_as_they_are():
     ring, rng, now = Ring(True, 0.3), np.random.default_rng(8), []
     for number, things in enumerate(walk(12)):
         meshes = [deformed(MESHES[0], rng), MESHES[1]] if number in (3, 6, 7, 9) else MESHES
-        now = [*now, (ring.at(things, meshes), things, meshes)][-ROOMS:]
+        now = [*now, (ring.geometry_at(things, meshes), things, meshes)][-ROOMS:]
         for geometry, own, shown in now:
             same(geometry, own, shown, True, None)
 
@@ -113,7 +113,7 @@ def test_normals_of_some_things_leave_those_of_others_for_later(seed):
     late = 0
     for things in [[thing(i, pose(rng)) for i in range(3)] for _ in range(12)]:
         meshes = [*MESHES, cube(0.3)]
-        geometry, built = ring.at(things, meshes), build_geometry(things, meshes, True, 0.3)
+        geometry, built = ring.geometry_at(things, meshes), build_geometry(things, meshes, True, 0.3)
         asked = rng.permutation(3)[: rng.integers(0, 3)].tolist()
         for some in ([], asked):
             found, start = geometry.triangle_normals_of(some), geometry.triangle_start
@@ -129,10 +129,10 @@ def test_normals_of_some_things_leave_those_of_others_for_later(seed):
 
 def test_what_is_asked_for_again_is_the_same_object_and_what_moved_is_not():
     ring, (a, b, *_) = Ring(True, 0.3), walk(3)
-    first, second = ring.at(a, MESHES), ring.at(b, MESHES)
-    assert ring.at(list(a), list(MESHES)) is first and ring.at(b, MESHES) is second and first is not second
-    assert ring.at(a, MESHES, DEEP) is not first
-    assert ring.at(a, MESHES, DEEP).ground_z == -50000.0 and first.ground_z > -50000.0
+    first, second = ring.geometry_at(a, MESHES), ring.geometry_at(b, MESHES)
+    assert ring.geometry_at(list(a), list(MESHES)) is first and ring.geometry_at(b, MESHES) is second and first is not second
+    assert ring.geometry_at(a, MESHES, DEEP) is not first
+    assert ring.geometry_at(a, MESHES, DEEP).ground_z == -50000.0 and first.ground_z > -50000.0
 
 
 def test_labels_of_what_moved_are_those_of_what_is_built_there():
@@ -147,7 +147,7 @@ def test_labels_of_what_moved_are_those_of_what_is_built_there():
             thing(1, ((1, 0, 0, 0.3), (0, 1, 0, 0), (0, 0, 1, 0), (0, 0, 0, 1))),
         ]
         camera = orbit_camera(lens(48, 36), rng.uniform(-1, 1), rng.uniform(0.4, 1), 4.0)
-        geometry, built = ring.at(things, MESHES), build_geometry(things, MESHES, True, 0.3)
+        geometry, built = ring.geometry_at(things, MESHES), build_geometry(things, MESHES, True, 0.3)
         own, other = (observe(g, camera, rasterize(g, camera), names) for g in (geometry, built))
         assert len(np.unique(own["instances"])) > 1
         assert all(np.array_equal(own[name], other[name], equal_nan=True) for name in names)
@@ -179,7 +179,7 @@ def test_the_ground_is_as_high_as_at_the_lowest_instant():
     shot = moving(lifted(2, -1, 3, turn=0.3), lifted(0))
     assert floor_of(shot, [cube(0.5), cube(9.0)]) == -1 - (np.float64(0.5) * np.sin(0.3) + 0.5 * np.cos(0.3))
     grounds = {
-        Ring(True, 0.3).at(shot.things_at(i), [cube(0.5), cube(0.5)], laid(shot, [cube(0.5), cube(0.5)])).ground_z
+        Ring(True, 0.3).geometry_at(shot.things_at(i), [cube(0.5), cube(0.5)], laid(shot, [cube(0.5), cube(0.5)])).ground_z
         for i in range(3)
     }
     assert grounds == {floor_of(shot, [cube(0.5)] * 2)}
@@ -195,7 +195,7 @@ def test_a_fixed_ground_stays_where_it_is():
     shot = moving(lifted(2, -1, 3), floor=fixed)
     assert laid(shot, [cube()]) == fixed
     ring = Ring(True, 0.3)
-    assert [ring.at(shot.things_at(i), [cube()], fixed).ground_z for i in range(3)] == [0.25] * 3
+    assert [ring.geometry_at(shot.things_at(i), [cube()], fixed).ground_z for i in range(3)] == [0.25] * 3
 
 
 def test_what_is_not_there_or_stands_still_lays_no_ground():
@@ -211,5 +211,5 @@ def test_no_point_of_what_turns_is_below():
     for _ in range(20):
         poses = tuple(pose(rng) for _ in range(3))
         meshes = [random_soup(rng, 30)]
-        world = [Ring(False, 0.3).at(moving(poses).things_at(i), meshes).extent()[0][2] for i in range(3)]
+        world = [Ring(False, 0.3).geometry_at(moving(poses).things_at(i), meshes).extent()[0][2] for i in range(3)]
         assert floor_of(moving(poses), meshes) == min(world)

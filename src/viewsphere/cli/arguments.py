@@ -20,14 +20,16 @@ if TYPE_CHECKING:
 RecipeFile = Annotated[Path, typer.Argument(help="Recipe (YAML).", show_default=False)]
 
 
-def at(path: Path | None) -> Path | None:
+def located_path(path: Path | None) -> Path | None:
     """The folder of this path, or the data at its URL."""
     from viewsphere.store import located
 
     return None if path is None else located(path)
 
 
-DataFolder = Annotated[Path, typer.Argument(help="Folder or URL that `render` wrote.", show_default=False, callback=at)]
+DataFolder = Annotated[
+    Path, typer.Argument(help="Folder or URL that `render` wrote.", show_default=False, callback=located_path)
+]
 Changes = Annotated[
     list[str] | None,
     typer.Option(

@@ -16,7 +16,7 @@ from viewsphere.cli.arguments import (
     FormatOptions,
     Workers,
     asked_formats,
-    at,
+    located_path,
     split,
     with_options,
 )
@@ -48,7 +48,11 @@ def export(
     output: Annotated[
         Path | None,
         typer.Option(
-            "-o", "--output", help="Folder for the formats' folders; default: the data set's.", show_default=False, callback=at
+            "-o",
+            "--output",
+            help="Folder for the formats' folders; default: the data set's.",
+            show_default=False,
+            callback=located_path,
         ),
     ] = None,
     models: Annotated[
@@ -176,7 +180,8 @@ def check(
 def report(
     folder: DataFolder,
     output: Annotated[
-        Path | None, typer.Option("-o", "--output", help="Page to write; default: report.html in the folder.", callback=at)
+        Path | None,
+        typer.Option("-o", "--output", help="Page to write; default: report.html in the folder.", callback=located_path),
     ] = None,
     frames: Annotated[int, typer.Option(min=1, max=2000, help="Frames shown; all are counted.")] = 240,
     proofs: Annotated[bool, typer.Option("--check/--no-check", help="Show the findings of `check`.")] = True,

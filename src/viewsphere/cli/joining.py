@@ -9,7 +9,16 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from viewsphere.cli import completion
-from viewsphere.cli.arguments import AsJson, Durability, FormatOptions, Formats, Workers, asked_formats, at, with_options
+from viewsphere.cli.arguments import (
+    AsJson,
+    Durability,
+    FormatOptions,
+    Formats,
+    Workers,
+    asked_formats,
+    located_path,
+    with_options,
+)
 from viewsphere.cli.terminal import MOST_FINDINGS, ProgressBar, print_json, say
 from viewsphere.errors import UserError
 from viewsphere.run.workers.worker_count import cores
@@ -19,7 +28,7 @@ if TYPE_CHECKING:
     from viewsphere.recipe.formats import FormatEntry
 
 NewFolder = Annotated[
-    Path | None, typer.Option("-o", "--output", help="Folder of the new data set.", show_default=False, callback=at)
+    Path | None, typer.Option("-o", "--output", help="Folder of the new data set.", show_default=False, callback=located_path)
 ]
 
 
@@ -102,7 +111,8 @@ def convert(
     ] = None,
     format_option: FormatOptions = None,
     output: Annotated[
-        Path | None, typer.Option("-o", "--output", help="Folder for the formats' folders.", show_default=False, callback=at)
+        Path | None,
+        typer.Option("-o", "--output", help="Folder for the formats' folders.", show_default=False, callback=located_path),
     ] = None,
     keep_going: Annotated[bool, typer.Option(help="Skip broken entries.")] = False,
     workers: Workers = None,

@@ -20,8 +20,8 @@ from viewsphere.cli.arguments import (
     Formats,
     RecipeFile,
     asked_formats,
-    at,
     load_recipe,
+    located_path,
     with_options,
 )
 from viewsphere.cli.next_step import for_command, for_render
@@ -271,7 +271,10 @@ def plan(
 
 def preview(
     source: Annotated[
-        Path, typer.Argument(help="Recipe (YAML), or a folder or URL that `render` wrote.", show_default=False, callback=at)
+        Path,
+        typer.Argument(
+            help="Recipe (YAML), or a folder or URL that `render` wrote.", show_default=False, callback=located_path
+        ),
     ],
     output: Annotated[Path, typer.Option("-o", "--output", help="Picture to write.")] = Path("preview.png"),
     count: Annotated[int, typer.Option("-n", "--count", min=1, help="Frames shown; for sequences, instants.")] = 12,
@@ -342,7 +345,9 @@ def _write_video(source: Path, file: Path, draw: list[str], sequence: str | None
 
 DataSetFolder = Annotated[
     Path | None,
-    typer.Option("-o", "--output", help="Folder of the data set, or a URL (s3://...).", show_default=False, callback=at),
+    typer.Option(
+        "-o", "--output", help="Folder of the data set, or a URL (s3://...).", show_default=False, callback=located_path
+    ),
 ]
 RenderWorkers = Annotated[
     int | None,

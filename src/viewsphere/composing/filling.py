@@ -71,7 +71,7 @@ def filled(shot: Shot, together: bool) -> Shot:
 def _filled(shot: Shot, i: int, together: bool) -> Instant:
     now = shot.instants[i]
     view = now.viewpoint
-    targets = [there for thing in shot.targets(together) if (there := thing.at(i)).is_there]
+    targets = [there for thing in shot.targets(together) if (there := thing.still_at(i)).is_there]
     if view is None or view.fill is None or not targets:
         return now
     placed = [_placed(thing) for thing in targets]

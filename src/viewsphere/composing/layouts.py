@@ -69,9 +69,9 @@ class Carried:
     world_from_room: Matrix4
     turned: Matrix4
 
-    def at(self, seconds: float) -> Matrix4:
+    def pose_at(self, seconds: float) -> Matrix4:
         """World from object at a time, seconds from the start of the path."""
-        return composed(self.world_from_room, composed(self.way.at(seconds), self.turned))
+        return composed(self.world_from_room, composed(self.way.pose_at(seconds), self.turned))
 
 
 @dataclass(frozen=True, eq=False)

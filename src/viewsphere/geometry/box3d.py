@@ -94,7 +94,7 @@ class Box3d:
         """Both ends of each of the twelve edges, (12, 2, 3)."""
         return self.corners[np.array(_EDGES)]
 
-    def at(self, sides: Sequence[Side]) -> Array:
+    def corners_at(self, sides: Sequence[Side]) -> Array:
         """The corners on these sides of the centre, (N, 3)."""
         return self.corners[[_SIDES.index(side) for side in sides]]
 

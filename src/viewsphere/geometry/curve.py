@@ -49,7 +49,7 @@ class Curve:
         """Lengths (N,) at which the curve passes its points."""
         return np.append(self.pieces[:, 0], self.length)
 
-    def at(self, length: ArrayLike) -> Float:
+    def points_at(self, length: ArrayLike) -> Float:
         """Points (..., D) at these lengths (...). Lengths beyond the end of an open curve give the end; on a closed curve they
         wrap around.
         """

@@ -118,7 +118,7 @@ class Shot(Frozen):
 
     def things_at(self, instant: int) -> tuple[Thing, ...]:
         """Return the things as they are at an instant, counted from 0 in the shot: as still things, or absent."""
-        return tuple(thing.at(instant) for thing in self.things)
+        return tuple(thing.still_at(instant) for thing in self.things)
 
     def poses_at(self, instant: int) -> tuple[Motion, ...]:
         """Return the motion of each moving thing at an instant counted from 0 in the shot: its place and its time step.

@@ -55,7 +55,7 @@ class Motion(Frozen):
         """Return whether the thing has one pose for all instants, and shows no time step."""
         return len(self.poses) == 1 and self.steps == (None,) and not self.moves
 
-    def at(self, instant: int) -> Matrix4 | None:
+    def pose_at(self, instant: int) -> Matrix4 | None:
         """World from object at an instant, counted from 0 in the shot."""
         return self.poses[0 if len(self.poses) == 1 else instant]
 
@@ -65,7 +65,7 @@ class Motion(Frozen):
 
     def held(self, instant: int) -> Motion:
         """A still motion with the pose and time step of an instant, counted from 0 in the shot."""
-        return self if self.is_still else Motion(poses=(self.at(instant),), steps=(self.step_at(instant),))
+        return self if self.is_still else Motion(poses=(self.pose_at(instant),), steps=(self.step_at(instant),))
 
     def lasts(self, instants: int) -> bool:
         """Return whether the motion has poses and time steps for this number of instants."""
@@ -119,7 +119,7 @@ class Thing(Frozen):
         """The thing at its pose, at one time step of its model's file."""
         return self.model_copy(update={"motion": Motion(poses=self.motion.poses, steps=(step,))})
 
-    def at(self, instant: int) -> Thing:
+    def still_at(self, instant: int) -> Thing:
         """The thing as it is at an instant, counted from 0 in the shot: as a still thing, or absent."""
         return self if self.motion.is_still else self.model_copy(update={"motion": self.motion.held(instant)})
 

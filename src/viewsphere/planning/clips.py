@@ -69,7 +69,7 @@ def _played(clips: tuple[MotionEntry, ...], spec: ModelSpec, line: Timeline, tim
     around = range(-1, time.count + 1) if time.shutter else range(time.count)
     start = Start(IDENTITY, spec, time.seconds_at(time.count - 1), lambda *names: generator(0, *names))
     there = tuple(entry.model_copy(update={"enter": None, "leave": None}) for entry in clips)
-    moved = mover(there, start.playing(line, field)).at([time.seconds_at(i) for i in around])
+    moved = mover(there, start.playing(line, field)).motion_at([time.seconds_at(i) for i in around])
     return [step for step in moved.steps if step is not None]
 
 

@@ -66,7 +66,7 @@ class Ring:
     _rooms: list[_Room] = field(default_factory=list[_Room])
     _passing: list[_Room] = field(default_factory=list[_Room])
 
-    def at(self, things: Sequence[Thing], meshes: Sequence[Mesh], floor: Floor | None = None) -> Geometry:
+    def geometry_at(self, things: Sequence[Thing], meshes: Sequence[Mesh], floor: Floor | None = None) -> Geometry:
         """The geometry of these still things; `meshes[i]` is the mesh of `things[i]` at this instant, even if the thing is
         absent.
 

@@ -192,7 +192,7 @@ def views_of(shot: Shot, mesh_of: Callable[[Thing], Mesh]) -> ShotViews:
         return [mesh_of(thing) for thing in shot.things_at(instant)]
 
     floor = shot_floor(shot, meshes_at)
-    return ShotViews(shot, lambda instant: ring.at(shot.things_at(instant), meshes_at(instant), floor), mesh_of)
+    return ShotViews(shot, lambda instant: ring.geometry_at(shot.things_at(instant), meshes_at(instant), floor), mesh_of)
 
 
 def _drawn(view: View, count: int, on_objects: bool, rng: np.random.Generator) -> Float:
@@ -254,7 +254,7 @@ class NeighbourViews:
         if instant is None:
             return None
         cameras = tuple(shot.camera(instant, sensor) for sensor in range(len(shot.rig.sensors)))
-        poses = tuple(thing.motion.at(instant) for thing in shot.objects)
+        poses = tuple(thing.motion.pose_at(instant) for thing in shot.objects)
         return Moment(shot.instants[instant].seconds, poses, cameras, self.sensor_number)
 
     def view(self, instants: int, sensor: str | None) -> View | None:
@@ -295,7 +295,7 @@ class NeighbourViews:
         rotation = np.ascontiguousarray(placed[:, :3, :3].swapaxes(1, 2))
         moved = dict[int, Float]()
         for i, thing in enumerate(shot.things):
-            poses = [thing.motion.at(instant) for instant in range(len(shot.instants))]
+            poses = [thing.motion.pose_at(instant) for instant in range(len(shot.instants))]
             now = poses[self.instant]
             if now is not None and any(pose not in (None, now) for pose in poses):
                 back = _back(np.array(now))

@@ -85,8 +85,8 @@ def _meshes(document: Document, step: Field | None) -> Sequence[Field]:
     """The meshes of the parts, or of the parts of one time step."""
     if step is None:
         return document.root.items("meshes")
-    nodes = (document.root.at("nodes", int(child.value)) for child in step.items("children"))
-    return [document.root.at("meshes", node.integer("mesh")) for node in nodes]
+    nodes = (document.root.item("nodes", int(child.value)) for child in step.items("children"))
+    return [document.root.item("meshes", node.integer("mesh")) for node in nodes]
 
 
 def _primitives(document: Document, meshes: Sequence[Field], parts: Sequence[str]) -> Iterator[Part]:

@@ -223,7 +223,7 @@ def _contradictions(sample: Sample, shot: Shot, place: int) -> Iterator[str]:
     known = (now.split, shot.sequence, shot.rig.sensors[sensor].name, now.index, now.seconds)
     if stored != known:
         yield f"expected split, sequence, sensor, instant and time {known} of the shot, found {stored}"
-    poses = {thing.id: pose for thing in shot.objects if (pose := thing.motion.at(instant)) is not None}
+    poses = {thing.id: pose for thing in shot.objects if (pose := thing.motion.pose_at(instant)) is not None}
     if [o.id for o in sample.objects] != list(poses):
         yield f"expected the objects {list(poses)} of the shot, found {[o.id for o in sample.objects]}"
         return

@@ -78,7 +78,7 @@ class Way:
     seconds: tuple[float, ...]
     states: tuple[State, ...]
 
-    def at(self, seconds: float) -> Matrix4:
+    def pose_at(self, seconds: float) -> Matrix4:
         """World from object at a time, interpolated linearly between states."""
         after = min(max(bisect_right(self.seconds, seconds), 1), len(self.states) - 1)
         a, b = np.array(self.states[after - 1]), np.array(self.states[after])

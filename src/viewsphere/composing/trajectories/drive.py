@@ -56,7 +56,7 @@ class Drive:
         lengths = entry.offset + entry.speed * times
         ahead = level(curve, lengths)
         right = np.stack([ahead[:, 1], -ahead[:, 0], np.zeros(len(ahead))], axis=1)
-        centers = curve.at(lengths) + entry.side * right + np.array([0.0, 0.0, entry.height])
+        centers = curve.points_at(lengths) + entry.side * right + np.array([0.0, 0.0, entry.height])
         return aimed(centers, ahead, focuses(entry, entry.look, times, world), world)
 
     def _lane(self, world: World) -> Curve:

@@ -85,7 +85,7 @@ class Spline:
         """See `Trajectory.poses`."""
         lengths = self._lengths(times)
         focus = focuses(self.entry, self.entry.look, times, world)
-        return aimed(self.curve.at(lengths), self.curve.direction(lengths), focus, world)
+        return aimed(self.curve.points_at(lengths), self.curve.direction(lengths), focus, world)
 
     def _lengths(self, times: Float) -> Float:
         """Metres along the path at these times."""

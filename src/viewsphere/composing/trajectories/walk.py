@@ -116,7 +116,7 @@ class Walk:
             walked = entry.speed * times
         else:
             walked = np.minimum(entry.speed * times, self._curve.length)
-            places, ahead = self._curve.at(walked), level(self._curve, walked)
+            places, ahead = self._curve.points_at(walked), level(self._curve, walked)
         right = np.stack([ahead[:, 1], -ahead[:, 0], np.zeros(len(ahead))], axis=1)
         sway, rise = self._bob(walked)
         centers = places + sway[:, None] * right + np.array([0.0, 0.0, entry.eye_height])

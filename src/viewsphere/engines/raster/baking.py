@@ -55,7 +55,7 @@ class Packed:
         """The surfaces of all things; see `surface.Rows`."""
         return self.rows.surfaces
 
-    def at(self, arranged: Arranged, ground: Ground | None, lengths: Lengths) -> Packed:
+    def after_moving(self, arranged: Arranged, ground: Ground | None, lengths: Lengths) -> Packed:
         """The data after things have moved. Do not use this object afterwards: data of moved things is overwritten in place."""
         geometry, same_lengths = arranged.geometry, lengths == self.lengths
         materials = self.materials if same_lengths and self.materials.made_of == made_of(arranged.whole) else None

@@ -78,7 +78,9 @@ class RasterStage:
     def _pack(self, arranged: Arranged) -> Packed:
         """Return the packed materials and surfaces of arranged things, which replace those of the last instant."""
         ground, lengths = self.shot.scene.ground, self._lengths if arranged.is_sequence else still_lengths(arranged)
-        self._packed[:] = [self._packed[0].at(arranged, ground, lengths) if self._packed else pack(arranged, ground, lengths)]
+        self._packed[:] = [
+            self._packed[0].after_moving(arranged, ground, lengths) if self._packed else pack(arranged, ground, lengths)
+        ]
         return self._packed[0]
 
     @cached_property

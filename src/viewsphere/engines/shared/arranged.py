@@ -131,7 +131,7 @@ class Arrangements:
         known = self._known.pop(instant, None)
         things = self.shot.things_at(instant) if known is None else known.things
         meshes = self._meshes(things) if known is None else known.whole
-        geometry = self.ring.at(things, meshes, self.floor)
+        geometry = self.ring.geometry_at(things, meshes, self.floor)
         if known is None or known.geometry is not geometry:
             known = self._arranged(things, meshes, meshes, geometry)
         self._known[instant] = known  # the most recently requested comes last

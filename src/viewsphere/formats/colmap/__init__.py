@@ -76,7 +76,7 @@ class Colmap(Tree):
 
     def sample_files(self, sample: Sample) -> Iterator[File | Piece]:
         """A picture, its image record and points and, with the first picture of an instant, the frame."""
-        now, world, own = self._rigs.at(sample), world_of(self.dataset, sample), sample.index + 1
+        now, world, own = self._rigs.moment(sample), world_of(self.dataset, sample), sample.index + 1
         part = self.dataset.plan.part_of(sample.index)
         name = self.stem(sample).partition("/")[2] + suffix_of(sample, ".png", ".jpg")
         name = f"{now.folder}/{name}" if now.folder else name

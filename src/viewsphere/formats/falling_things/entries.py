@@ -54,7 +54,7 @@ def annotation(o: ObjectAnnotation, k: NDArray[np.float64], matrix: str) -> dict
     center = o.box3d_object.mean(axis=0)
     pose = compose(o.camera_from_object, rigid(OBJECT_FROM_FAT, center))
     pose[:3, 3] *= CM
-    middle, corners, box = pose[:3, 3], Box3d(o.box3d_camera).at(CUBOID) * CM, box_of(o)
+    middle, corners, box = pose[:3, 3], Box3d(o.box3d_camera).corners_at(CUBOID) * CM, box_of(o)
     assert box is not None
     inside = 1 - o.truncation
     return {

@@ -68,19 +68,19 @@ class _Place:
         """The split of its pictures if no list gives one."""
         return TRAIN if self.folder in ("", "training") else self.folder
 
-    def at(self, name: str) -> str:
+    def path_of(self, name: str) -> str:
         """The path of an item in the folder, relative to the root."""
         return f"{self.folder}/{name}" if self.folder else name
 
     @property
     def images(self) -> str:
         """The path of its pictures."""
-        return self.at("image_02" if self.is_tracked else "image_2")
+        return self.path_of("image_02" if self.is_tracked else "image_2")
 
     @property
     def labels(self) -> str:
         """The path of its labels."""
-        return self.at("label_02" if self.is_tracked else "label_2")
+        return self.path_of("label_02" if self.is_tracked else "label_2")
 
     def names(self, root: Path) -> list[str]:
         """The names of its pictures."""
@@ -170,7 +170,7 @@ def _picture(
     if place.is_tracked and not (is_name(sequence) and number.isdecimal() and int(number) < MOST_TRACKS):
         raise ValueError("expected a picture's name of a sequence and a number")
     own = sequence if place.is_tracked else name
-    labels, calibrated = (file_inside(root, f"{at}/{own}.txt") for at in (place.labels, place.at("calib")))
+    labels, calibrated = (file_inside(root, f"{at}/{own}.txt") for at in (place.labels, place.path_of("calib")))
     if not labels.is_file():
         raise ValueError(f"expected {place.labels}/{own}.txt, empty where there are no objects; found no such file")
     if unusable := labels_of(labels, place.is_tracked).unusable:

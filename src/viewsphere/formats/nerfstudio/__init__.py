@@ -141,7 +141,7 @@ class Nerfstudio(Tree):
 
     def sample_files(self, sample: Sample) -> Iterator[File | Piece]:
         """A picture, its depth, and its entry."""
-        lens, now, world = sample.camera.intrinsics, self._rigs.at(sample), world_of(self.dataset, sample)
+        lens, now, world = sample.camera.intrinsics, self._rigs.moment(sample), world_of(self.dataset, sample)
         problem = _lens_problem(lens, self._kind)
         if problem:
             raise UserError(f"nerfstudio: frame {sample.index}: {problem}")

@@ -34,7 +34,7 @@ def story_of(timeline: Timeline, course: Course) -> Story:
             now = shot.instants[place]
             if now.index not in instants:
                 for thing in shot.objects:
-                    if thing.motion.at(place) is not None:
+                    if thing.motion.pose_at(place) is not None:
                         objects.setdefault(thing.id, []).append(now.index)
             instants[now.index] = splits[now.split] = None
             sensors.setdefault(sensor, []).append(now.index)

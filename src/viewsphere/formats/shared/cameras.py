@@ -87,7 +87,7 @@ class Rigs:
             self._found = {part: shot.rig for part, shot in shots.items() if shot is not None}
         return self._found
 
-    def at(self, sample: Sample) -> Moment:
+    def moment(self, sample: Sample) -> Moment:
         """The rig at the instant of a sample; only the sample's camera if its shot is unknown."""
         taken = sample.origin
         shot = taken.shot or self._shot(taken.key) if taken else None

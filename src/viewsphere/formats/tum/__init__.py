@@ -86,7 +86,7 @@ class Tum(Tree):
 
     def sample_files(self, sample: Sample) -> Iterator[File | Piece]:
         """A picture, its depth, its pose, and the lines that name them."""
-        lens, now, world = sample.camera.intrinsics, self._rigs.at(sample), world_of(self.dataset, sample)
+        lens, now, world = sample.camera.intrinsics, self._rigs.moment(sample), world_of(self.dataset, sample)
         if lens.skew or not _is_held(lens):
             raise UserError(f"tum: frame {sample.index}: expected a lens of k1 k2 p1 p2 k3; found another")
         folder = f"{world}/{now.folder}" if now.folder else world

@@ -40,7 +40,7 @@ class Sweep(Frozen):
         the thing is absent.
         """
         before, after, share = self._around(moment)
-        start, end = self.motion.at(before), self.motion.at(after)
+        start, end = self.motion.pose_at(before), self.motion.pose_at(after)
         return start if start is None or end is None or start == end else _between(start, end, share)
 
     def steps(self, moment: float) -> tuple[TimeStep | None, TimeStep | None, float]:

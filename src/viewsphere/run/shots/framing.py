@@ -160,7 +160,7 @@ class Framing:
         """
         recipe = self.plan.recipe
         wanted = shot.targets(recipe.scenes is not None)
-        if not all(thing.at(instant).is_there for thing in wanted):
+        if not all(thing.still_at(instant).is_there for thing in wanted):
             return 1.0 if recipe.wanted is None else 0.0
         views = ShotViews(shot, lambda i: self._geometry(shot, i, ring))
         view = views.view(instant, 0)
@@ -175,7 +175,7 @@ class Framing:
         def meshes(at: int) -> tuple[Mesh, ...]:
             return tuple(self.stages.model(thing.model, thing.step) for thing in shot.things_at(at))
 
-        return ring.at(shot.things_at(instant), meshes(instant), shot_floor(shot, meshes))
+        return ring.geometry_at(shot.things_at(instant), meshes(instant), shot_floor(shot, meshes))
 
 
 def _content(shot: Shot, instant: int) -> float:
@@ -184,7 +184,7 @@ def _content(shot: Shot, instant: int) -> float:
 
 def _in_view(box_of: BoxOf, together: bool, shot: Shot, instant: int) -> float:
     """The value of a frame, judged by the corners of the objects' boxes: whether any sensor's picture may show an object."""
-    targets = [now for thing in shot.targets(together) if (now := thing.at(instant)).is_there]
+    targets = [now for thing in shot.targets(together) if (now := thing.still_at(instant)).is_there]
     cameras = (shot.camera(instant, sensor) for sensor in range(len(shot.rig.sensors)))
     seen = not targets or any(_may_show(camera, thing, box_of) for camera in cameras for thing in targets)
     return 0.0 if seen else OUT_OF_VIEW

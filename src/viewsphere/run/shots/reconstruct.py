@@ -125,7 +125,7 @@ class ViewReconstructor:
         there = {o.id: o for o in sample.objects}
         objects = tuple(self._thing(there.get(thing.id), thing) for thing in shot.objects)
         instant, _ = self._scenery.taken(sample, shot)
-        behind = tuple(thing.at(instant) for thing in around.things)
+        behind = tuple(thing.still_at(instant) for thing in around.things)
         ground = shot.scene.ground is not None and shot.scene.ground.is_labelled
         now = objects, behind, ground, shot.label_alpha, shot.scene.floor
         if self._geometry[0] != now:
@@ -162,7 +162,9 @@ class ViewReconstructor:
 
     def _shot_views(self, shot: Shot, around: SceneryRecord) -> ShotViews | None:
         """The views of a shot, with its exported models at the poses in the shot."""
-        if any(self._scenery.mesh(around, thing.at(i)) is None for thing in around.things for i in range(len(shot.instants))):
+        if any(
+            self._scenery.mesh(around, thing.still_at(i)) is None for thing in around.things for i in range(len(shot.instants))
+        ):
             return None
 
         def mesh(thing: Thing) -> Mesh:
@@ -210,7 +212,7 @@ class _Made:
         def moved(thing: Thing, then: Thing) -> Thing:
             if thing.motion == then.motion and thing.motion.is_still:
                 return thing
-            poses = inserted(map(thing.motion.at, range(len(own))), then.motion.at(at))
+            poses = inserted(map(thing.motion.pose_at, range(len(own))), then.motion.pose_at(at))
             steps = inserted(map(thing.motion.step_at, range(len(own))), then.motion.step_at(at))
             return thing.model_copy(update={"motion": Motion(poses=poses, steps=steps, moves=True)})
 

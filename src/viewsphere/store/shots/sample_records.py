@@ -207,7 +207,7 @@ class ShotRecords:
             if not 0 < record["id"] <= len(things):
                 raise ValueError(f"object {record['id']}: expected one of 1 to {len(things)}")
             spec, motion = things[record["id"] - 1].model, things[record["id"] - 1].motion
-            pose, step = motion.at(instant), motion.step_at(instant)
+            pose, step = motion.pose_at(instant), motion.step_at(instant)
             if pose is None:
                 raise ValueError(f"object {record['id']}: expected one that is there")
             facts = partial(self.facts, spec.key, step and step.frame)

@@ -71,7 +71,7 @@ def posed(document: Document, clip: str | None, seconds: float) -> Posed:
     for animation, channel, target in _channels(document, clip):
         path = target.text("path")
         if path in WIDTHS:
-            sampler = animation.at("samplers", channel.integer("sampler"))
+            sampler = animation.item("samplers", channel.integer("sampler"))
             nodes.setdefault(target.integer("node"), {})[path] = _sampled(document, sampler, path, seconds)
     return nodes
 

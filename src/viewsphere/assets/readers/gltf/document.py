@@ -107,7 +107,7 @@ class Document:
     def buffer(self, index: int) -> bytes:
         """Bytes of a buffer; raises ModelError if it is missing or shorter than declared."""
         if index not in self._buffers:
-            entry = self.root.at("buffers", index)
+            entry = self.root.item("buffers", index)
             length = entry.integer("byteLength")
             if "uri" in entry:
                 data = self._external(entry)
@@ -129,7 +129,7 @@ class Document:
 
     def view(self, index: int) -> tuple[memoryview, int | None]:
         """Plain bytes of a bufferView and its stride."""
-        entry = self.root.at("bufferViews", index)
+        entry = self.root.item("bufferViews", index)
         stride = entry.integer("byteStride", 0) or None
         packed = meshopt_of(entry)
         if packed is None or (not is_readable(packed[0]) and self._has_plain_copy(entry)):
@@ -141,7 +141,7 @@ class Document:
     def _has_plain_copy(self, entry: Field) -> bool:
         """Return whether the buffer of a compressed bufferView holds the plain data, too."""
         index = entry.integer("buffer")
-        return "uri" in self.root.at("buffers", index) or (index == 0 and self.binary is not None)
+        return "uri" in self.root.item("buffers", index) or (index == 0 and self.binary is not None)
 
     def slice(self, entry: Field) -> memoryview:
         """The bytes of a buffer that an entry names by `buffer`, `byteOffset` and `byteLength`."""
@@ -169,7 +169,7 @@ class Document:
 
     def accessor(self, index: int, widths: tuple[int, ...]) -> NDArray[Any]:
         """Elements (count, width): normalised integers as float64 in [-1, 1], others in their own dtype."""
-        entry = self.root.at("accessors", index)
+        entry = self.root.item("accessors", index)
         kind, code = entry.text("type"), entry.integer("componentType")
         width = WIDTHS.get(kind)
         if width not in widths or code not in COMPONENTS:

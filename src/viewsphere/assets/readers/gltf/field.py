@@ -46,7 +46,7 @@ class Field:
             raise Field(value, f"{self.where}.{key}").fail("an array")
         return [Field(v, f"{self.where}.{key}[{i}]") for i, v in enumerate(cast("list[Any]", value))]
 
-    def at(self, key: str, index: int) -> Field:
+    def item(self, key: str, index: int) -> Field:
         """One item of an array in the file's root; ModelError when the index is out of range."""
         value = self.mapping().get(key, [])
         if not isinstance(value, list):

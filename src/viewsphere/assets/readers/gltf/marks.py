@@ -32,7 +32,7 @@ def is_line(document: Document, node: Field) -> bool:
     """Return whether a node is a lane made only of lines, which must stay invisible."""
     if kind_of(node.text("name"), _said(node).get(PROPERTY)) != LANE or "mesh" not in node:
         return False
-    primitives = document.root.at("meshes", node.integer("mesh")).items("primitives")
+    primitives = document.root.item("meshes", node.integer("mesh")).items("primitives")
     return all(one.integer("mode", FACES[0]) in (LINES, LOOP, LINE_STRIP) for one in primitives)
 
 
@@ -59,7 +59,7 @@ def _marker(
 def _lines(document: Document, node: Field, world: Float) -> tuple[tuple[Point, ...], tuple[Edge, ...]]:
     """The points of a node's lines in the scene, and their edges."""
     points, edges = list[Point](), list[Edge]()
-    for primitive in document.root.at("meshes", node.integer("mesh")).items("primitives"):
+    for primitive in document.root.item("meshes", node.integer("mesh")).items("primitives"):
         positions = document.accessor(primitive.get("attributes").integer("POSITION"), (3,)).astype(np.float64)
         if not np.isfinite(positions).all():
             raise primitive.fail("finite positions of a lane")

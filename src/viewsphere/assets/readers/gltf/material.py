@@ -122,7 +122,7 @@ class _Reader:
         if key not in parent:
             return None
         info = parent.get(key)
-        entry = self.document.root.at("textures", info.integer("index"))
+        entry = self.document.root.item("textures", info.integer("index"))
         image = self._image(entry)
         transform = info.extension("KHR_texture_transform") or Field({}, info.where)
         texcoord = transform.integer("texCoord", info.integer("texCoord", 0))
@@ -130,7 +130,7 @@ class _Reader:
             if image is not None:
                 self.document.folder.warn(f"{key} uses TEXCOORD_{texcoord}, only 0 and 1 are read; its factor is used")
             return None
-        sampler = self.document.root.at("samplers", entry.integer("sampler")) if "sampler" in entry else Field({}, "")
+        sampler = self.document.root.item("samplers", entry.integer("sampler")) if "sampler" in entry else Field({}, "")
         offset = transform.numbers("offset", 2, (0.0, 0.0))
         scale = transform.numbers("scale", 2, (1.0, 1.0))
         return Texture(
@@ -151,7 +151,7 @@ class _Reader:
             other = ", ".join(texture.get("extensions").mapping()) or "no source"
             folder.warn(f"a texture with {other} is not read; the material's plain factor is used")
             return None
-        entry = self.document.root.at("images", index)
+        entry = self.document.root.item("images", index)
         name = entry.text("name") or f"image{index}"
         if "bufferView" in entry:
             data, _ = self.document.view(entry.integer("bufferView"))

@@ -35,9 +35,9 @@ def read_pieces(document: Document, worlds: Mapping[int, Float], now: Posed = Ma
     meshes: dict[int, list[Primitive]] = {}  # read once without morphing or skinning, for instances
     total = 0
     for index, part in parts.items():
-        node, world = document.root.at("nodes", index), worlds[index]
+        node, world = document.root.item("nodes", index), worlds[index]
         mesh = node.integer("mesh")
-        entry = document.root.at("meshes", mesh)
+        entry = document.root.item("meshes", mesh)
         moved_weights = now.get(index, {}).get("weights")
         weights = tuple(_weights(node) or _weights(entry) if moved_weights is None else moved_weights.tolist())
         if "skin" in node or any(weights):
@@ -50,7 +50,7 @@ def read_pieces(document: Document, worlds: Mapping[int, Float], now: Posed = Ma
         document.folder.check("MAX_TRIANGLES", total, "triangles, all instances counted,")
         placed = (replace(moved(piece, matrix), part=part) for matrix in matrices for piece in local)
         pieces.extend(piece if piece.normals is not None else flat(piece) for piece in placed)
-    if not pieces and any("mesh" in document.root.at("nodes", index) for index in _hidden(document, worlds)):
+    if not pieces and any("mesh" in document.root.item("nodes", index) for index in _hidden(document, worlds)):
         raise document.folder.error("all of its meshes are hidden (KHR_node_visibility); show some, and export it again")
     return pieces
 
@@ -60,9 +60,9 @@ def part_names(document: Document, worlds: Mapping[int, Float]) -> dict[int, str
     names, taken = dict[int, str](), dict[str, int]()
     hidden = _hidden(document, worlds)
     for index, world in worlds.items():
-        node = document.root.at("nodes", index)
+        node = document.root.item("nodes", index)
         if "mesh" in node and index not in hidden and world[:3, :3].any() and not is_line(document, node):
-            entry = document.root.at("meshes", node.integer("mesh"))
+            entry = document.root.item("meshes", node.integer("mesh"))
             names[index] = _unused(node.text("name") or entry.text("name") or f"node{index}", taken)
     return names
 
@@ -71,7 +71,7 @@ def _hidden(document: Document, worlds: Mapping[int, Float]) -> set[int]:
     """The nodes that KHR_node_visibility hides, and all below them; `worlds` lists parents first."""
     hidden = set[int]()
     for index in worlds:
-        node = document.root.at("nodes", index)
+        node = document.root.item("nodes", index)
         visibility = node.extension("KHR_node_visibility")
         if index in hidden or not (visibility is None or visibility.boolean("visible", True)):
             hidden |= {index, *_indices(node, "children")}
@@ -98,7 +98,7 @@ def world_matrices(document: Document, below: str | None = None, now: Posed = Ma
     if below is not None:
         starts = _indices(_named(document, below), "children")
     elif "scenes" in root and root.items("scenes"):
-        starts = _indices(root.at("scenes", root.integer("scene", 0)), "nodes")
+        starts = _indices(root.item("scenes", root.integer("scene", 0)), "nodes")
     else:
         children = {child for node in nodes for child in _indices(node, "children")}
         starts = [i for i in range(len(nodes)) if i not in children]
@@ -109,7 +109,7 @@ def world_matrices(document: Document, below: str | None = None, now: Posed = Ma
         document.folder.check("MAX_NESTING", depth, "nodes within one another")
         if index in worlds:
             raise document.folder.error(f"nodes[{index}] is reached twice: expected a tree, found a cycle or a shared child")
-        node = root.at("nodes", index)
+        node = root.item("nodes", index)
         worlds[index] = compose(parent, _local_matrix(node, now.get(index, {})))
         stack.extend((child, worlds[index], depth + 1) for child in reversed(_indices(node, "children")))
     return worlds
@@ -208,7 +208,7 @@ def _skin(document: Document, node: Field, worlds: Mapping[int, Float]) -> _Skin
     """The skin of a node, None if it has none."""
     if "skin" not in node:
         return None
-    skin = document.root.at("skins", node.integer("skin"))
+    skin = document.root.item("skins", node.integer("skin"))
     joints = _indices(skin, "joints")
     outside = [joint for joint in joints if joint not in worlds]
     if outside or not joints:
@@ -226,7 +226,7 @@ def _skin(document: Document, node: Field, worlds: Mapping[int, Float]) -> _Skin
 def _names(document: Document, joints: Sequence[int]) -> tuple[str, ...]:
     """Names of nodes, made unique."""
     taken = dict[str, int]()
-    said = ((joint, document.root.at("nodes", joint).text("name").strip()) for joint in joints)
+    said = ((joint, document.root.item("nodes", joint).text("name").strip()) for joint in joints)
     return tuple(_unused(name if is_name(name) else f"node{joint}", taken) for joint, name in said)
 
 
@@ -277,7 +277,7 @@ def _primitive(document: Document, entry: Field) -> Primitive | None:
     count = len(positions)
     material = entry.integer("material") if "material" in entry else len(document.root.items("materials"))
     if "material" in entry:
-        document.root.at("materials", material)
+        document.root.item("materials", material)
     triangles = _triangles(document, entry, mode, count)
     place = entry.where.removeprefix(f"{document.folder.model}: ")
     check_coordinates(document.folder, positions, triangles, f"{place}: ")

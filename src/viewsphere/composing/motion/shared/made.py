@@ -85,7 +85,7 @@ class Mover:
         pose = self._at(time)
         return (None, None) if pose is None else (_recorded(pose, self.start.placed), pose.step)
 
-    def at(self, times: Sequence[float]) -> Motion:
+    def motion_at(self, times: Sequence[float]) -> Motion:
         """Return the poses and time steps of the thing at successive times, seconds; a single value for all times where they
         are equal.
         """

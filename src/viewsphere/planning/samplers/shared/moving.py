@@ -37,7 +37,7 @@ class Moving:
 
     def around(self, instant: int, moments: Iterable[float]) -> Motion:
         """The motion at moments around an instant, counted in instants."""
-        return self.mover.at([(instant + moment) / self.time.fps for moment in moments])
+        return self.mover.motion_at([(instant + moment) / self.time.fps for moment in moments])
 
     @property
     def plays_file(self) -> bool:

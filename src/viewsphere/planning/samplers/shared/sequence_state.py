@@ -119,7 +119,7 @@ def target_ways(context: SamplingContext, subject: str, pose: str | None, box_of
     """Return the path to its place of each target of a sequence, then of each distractor; None for a thing without a path."""
     if context.recipe.scenes is not None:
         layout = scene_laid(context, subject, pose, box_of)
-        return tuple(way.at for way in layout.ways) or (None,) * len(layout.members)
+        return tuple(way.pose_at for way in layout.ways) or (None,) * len(layout.members)
     spec = context.spec(subject)
     company = None
     if context.composition is not None:
@@ -128,7 +128,7 @@ def target_ways(context: SamplingContext, subject: str, pose: str | None, box_of
         )
     if company is None:
         return (None,)
-    return (None, *(tuple(way.at for way in company.ways) or (None,) * len(company.members)))
+    return (None, *(tuple(way.pose_at for way in company.ways) or (None,) * len(company.members)))
 
 
 def middle(things: Sequence[Thing], box_of: BoxOf) -> Vector:
