@@ -75,7 +75,9 @@ class Distances:
         return None
 
     def _of_other_sensors(self, there: Standing, poses: Sequence[int], subject: str) -> RecipeError | None:
-        """An error for the first pose with another sensor than the rig's first inside an object's box."""
+        """The error for the first pose at which a sensor besides the rig's first is inside an object's box; None without
+        such a pose.
+        """
         others = self.plan.rig.sensors[1:]
         if not others:
             return None

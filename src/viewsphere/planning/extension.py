@@ -163,8 +163,8 @@ class DatasetPart(Sendable):
 
     @cached_property
     def _recipe_numbers(self) -> Indices | None:
-        """The recipe's number of every pose of the data set, -1 for those that the recipe lacks; None if all numbers are
-        equal.
+        """The recipe's number of every pose of the data set, -1 for poses that the recipe lacks. None if recipe and data set
+        number their poses equally.
         """
         if has_poses_of(self.record, self.plan.pose_list):
             return None

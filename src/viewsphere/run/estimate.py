@@ -142,7 +142,7 @@ def _model_work(store: Store, portion: DatasetPart, spec: ModelSpec, steps: Sequ
 
 
 def _export(store: Store, formats: Sequence[FormatEntry], stopwatch: _Stopwatch) -> float:
-    """Write the formats; returns the seconds without those for searching the whole plan for frames."""
+    """Write the formats; returns the seconds that this took, without the search for frames in the whole plan."""
     dataset = Dataset(store.root)
     assert len(dataset) > 0
     written = [(entry, store.root / entry.name) for entry in formats]

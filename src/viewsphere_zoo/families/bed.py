@@ -103,7 +103,7 @@ class Bed:
 
     @property
     def extent(self) -> tuple[float, float, float]:
-        """Width, depth and height of all of it, metres, at most."""
+        """Greatest width, depth and height of the whole model, metres."""
         return self.width + 0.36, self.length + 0.2, max(self.head_height, self.posts)
 
 

@@ -47,7 +47,7 @@ class Book:
 
     @property
     def extent(self) -> tuple[float, float, float]:
-        """Width, depth and height of all of it, metres, at most."""
+        """Greatest width, depth and height of the whole model, metres."""
         match self.pose:
             case "standing":
                 return self.thickness + 0.01, self.width + 0.01, self.height + 0.01

@@ -61,7 +61,7 @@ class Box:
 
     @property
     def extent(self) -> tuple[float, float, float]:
-        """Width, depth and height of all of it, metres, at most."""
+        """Greatest width, depth and height of the whole model, metres."""
         flaps = (0.9 * self.width, 1.1 * self.depth, 0.2) if self.style == "open" else (0.03, 0.03, 0.02)
         return self.width + flaps[0], self.depth + flaps[1], self.height + flaps[2]
 

@@ -74,7 +74,7 @@ class Lamp:
 
     @property
     def extent(self) -> tuple[float, float, float]:
-        """Width, depth and height of all of it, metres, at most."""
+        """Greatest width, depth and height of the whole model, metres."""
         wide = 2 * self.shade_radius + (0.32 if self.style == "tripod" else 0.04)
         return wide, wide, self.height
 

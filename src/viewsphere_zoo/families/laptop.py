@@ -71,7 +71,7 @@ class Laptop:
 
     @property
     def extent(self) -> tuple[float, float, float]:
-        """Width, depth and height of all of it, metres, at most."""
+        """Greatest width, depth and height of the whole model, metres."""
         return self.width + 0.02, 2.0 * self.depth * (0.7 if self.angle < 118 else 0.82), self.depth + 0.03
 
 

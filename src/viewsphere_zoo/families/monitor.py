@@ -61,7 +61,7 @@ class Monitor:
 
     @property
     def extent(self) -> tuple[float, float, float]:
-        """Width, depth and height of all of it, metres, at most."""
+        """Greatest width, depth and height of the whole model, metres."""
         return self.width + 0.01, 0.31, self.height + self.lift + 0.07
 
 

@@ -69,7 +69,7 @@ class Plant:
 
     @property
     def extent(self) -> tuple[float, float, float]:
-        """Width, depth and height of all of it, metres, at most."""
+        """Greatest width, depth and height of the whole model, metres."""
         wide = 1.05 * max(SPREAD[self.habit] * self.reach, 2.3 * self.radius)
         return wide, wide, self.height + 1.1 * self.reach
 

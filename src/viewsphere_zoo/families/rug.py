@@ -53,7 +53,7 @@ class Rug:
 
     @property
     def extent(self) -> tuple[float, float, float]:
-        """Width, depth and height of all of it, metres, at most."""
+        """Greatest width, depth and height of the whole model, metres."""
         return self.width + 0.3, self.depth + 0.03, self.thickness + self.waves + 0.02
 
 

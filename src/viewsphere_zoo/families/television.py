@@ -78,7 +78,7 @@ class Television:
 
     @property
     def extent(self) -> tuple[float, float, float]:
-        """Width, depth and height of all of it, metres, at most."""
+        """Greatest width, depth and height of the whole model, metres."""
         wide, deep = self.console if self.style == "console" else (self.width, 0.54 if self.style == "tube" else 0.3)
         return wide + 0.04, deep + 0.04, self.stand + 0.6 * self.width + self.lift + 0.2
 

@@ -1,8 +1,8 @@
 """The loop: one JSON object a line in, one a line out.
 
-Blender itself prints to file descriptor 1, so answers go out through a copy of that descriptor, made before bpy is imported,
-and descriptor 1 is redirected to the log, as 2 is. A separate thread reads the requests: when the other process has ended, in
-whatever way, this thread meets the end of file at once and ends this process, even in the midst of a render.
+Blender itself prints to file descriptor 1, so answers go out through a copy of that descriptor, made before bpy is imported.
+Descriptor 1 is then redirected to the log, as 2 is. A separate thread reads the requests. When the other process ends, for
+any reason, this thread reads the end of the file and ends this process, even during a render.
 """
 
 from __future__ import annotations
@@ -31,8 +31,8 @@ ONLINE = ("socket.connect", "socket.getaddrinfo", "socket.gethostbyname", "socke
 def main(folder: Path, readable: list[str] | None = None, threads: int = 0) -> None:
     """Answer requests until the input ends, then remove `folder`, which contains the requests' arrays.
 
-    With `readable`, files are read only from these folders and from the system's, and written only to `folder`, where the
-    system can enforce it. Blender works with this many `threads`, 0 for one a core.
+    With `readable`, the process reads only these folders and the system's, and writes only to `folder`, if the system can
+    enforce it. Blender uses this many `threads`; 0: one per core.
     """
     if readable is not None:
         _bind(folder, readable)
@@ -95,7 +95,7 @@ def _stay_offline(event: str, _: tuple[Any, ...]) -> None:
 
 
 def _own_output() -> BinaryIO:
-    """A stream for answers, a copy of standard output; all else printed to standard output goes to the log from now on."""
+    """A stream for answers: a copy of standard output. From now on, everything else that is printed there goes to the log."""
     answers = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)
     sys.stdout.reconfigure(line_buffering=True)
@@ -109,14 +109,14 @@ def _read(requests: SimpleQueue[bytes], folder: Path) -> None:
 
 
 def _leave(folder: Path) -> None:
-    """Remove the folder and end at once, even in the midst of a render: Blender 4.5 can hang in its regular exit."""
+    """Remove the folder and end at once, even during a render: Blender 4.5 can hang in its regular exit."""
     shutil.rmtree(folder, ignore_errors=True)
     sys.stdout.flush()
     os._exit(0)
 
 
 def _hello(_: dict[str, Any]) -> dict[str, Any]:
-    """Versions, and the devices of Cycles."""
+    """The versions of Blender and numpy, and the devices of Cycles."""
     import bpy
     import numpy as np
 

@@ -1,7 +1,7 @@
-"""Restricts the files that this process may read and write: by Linux's Landlock, where the kernel has it (5.13 and later).
+"""Restricts the files that this process may read and write, by Linux's Landlock (kernel 5.13 and later).
 
-https://docs.kernel.org/userspace-api/landlock.html. A thread's restrictions pass on to the threads and
-processes that it starts later, and cannot be loosened: so they are set before bpy is imported, which starts threads.
+https://docs.kernel.org/userspace-api/landlock.html. Threads and processes inherit the restrictions of the thread that starts
+them, and nothing can loosen these. They are therefore set before bpy is imported, which starts threads.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ class _Beneath(ctypes.Structure):
 def confine(readable: list[str], writable: list[str]) -> bool:
     """Let this process read only the `readable` folders, its Python and the system's folders, and write only to `writable`.
 
-    Returns False, with nothing restricted, where the kernel has no Landlock.
+    Returns False, with nothing restricted, if the kernel has no Landlock.
     """
     if not sys.platform.startswith("linux"):
         return False
@@ -94,10 +94,10 @@ def die_with_parent() -> None:
 
 @contextmanager
 def few_cores(count: int) -> Iterator[None]:
-    """While the context lasts, let libraries that are loaded see this many cores, where the system can do that (Linux); 0: all.
+    """Show this many cores to libraries that are loaded in the context, if the system supports it (Linux); 0: all.
 
-    The cores are chosen by this process's id, so that processes that start at once use different ones. Afterwards
-    all threads may run on any core again.
+    The cores follow from this process's id, so that processes that start at the same time use different ones. Afterwards all
+    threads may run on any core again.
     """
     if not count or not hasattr(os, "sched_setaffinity"):
         yield
@@ -117,7 +117,7 @@ def few_cores(count: int) -> Iterator[None]:
 
 
 def some_of(cores: set[int], count: int, number: int) -> set[int]:
-    """`count` of the cores, or all if there are fewer; consecutive numbers get different cores as far as there are enough."""
+    """`count` of the cores, or all if there are fewer. Consecutive numbers get different cores while there are enough."""
     line = sorted(cores)
     first = number * count % len(line)
     return set((line * 2)[first : first + min(count, len(line))])

@@ -30,8 +30,9 @@ LOOK = 25
 CALM_LOOKS = 12
 CALM_SPEED, CALM_TURN = 0.03, 0.3
 CALM_WAY, CALM_ANGLE = 0.0003, 0.002
-"""Bodies seem to be at rest if this many checks in a row found them slower than this, metres and radians a second, and they
-moved no farther in total. The speeds are those of a thing that trembles on the spot, from one touching corner to the next.
+"""Bodies seem to be at rest if they were slower than `CALM_SPEED` and `CALM_TURN` (metres and radians a second) in
+`CALM_LOOKS` successive checks, and moved no farther than `CALM_WAY` and `CALM_ANGLE` in total. The speeds are those of a
+body that trembles on the spot, from one touching corner to the next.
 """
 
 REST_S, REST_WAY, REST_ANGLE = 1.0, 0.0009, math.radians(0.45)

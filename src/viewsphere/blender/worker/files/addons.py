@@ -1,4 +1,4 @@
-"""Finds parts of an open file that need add-ons or scripts, none of which the worker loads."""
+"""Finds the parts of an open file that need add-ons or scripts; the worker loads none of these."""
 
 from __future__ import annotations
 
@@ -9,7 +9,9 @@ DRIVEN = "objects", "meshes", "curves", "shape_keys", "materials", "armatures", 
 
 
 def needed():
-    """Warnings: nodes, node trees and render engines that no part of Blender makes, and scripts that would run on opening."""
+    """Warnings about nodes, node trees and render engines that Blender itself lacks, and about scripts that would run on
+    opening.
+    """
     said = []
     strangers = sorted({node.name for tree in _trees() for node in tree.nodes if node.bl_idname == "NodeUndefined"})
     strangers += sorted(tree.name for tree in bpy.data.node_groups if tree.bl_idname in ("", "NodeTreeUndefined"))
@@ -25,8 +27,8 @@ def needed():
 
 
 def remove_styles():
-    """Remove the style modules of Freestyle from all scenes: Blender runs their Python at rendering, also where it runs no
-    other scripts, and a compositor may render other scenes than the open one. Returns a warning where there are any.
+    """Remove the style modules of Freestyle from all scenes. Blender runs their Python at rendering, although it runs no
+    other scripts, and a compositor may render other scenes than the open one. Returns a warning if there were any.
     """
     layers = [layer for scene in bpy.data.scenes for layer in scene.view_layers if hasattr(layer, "freestyle_settings")]
     styles = {one.script for layer in layers for one in layer.freestyle_settings.modules if one.script is not None}

@@ -14,12 +14,14 @@ OPENCV_FROM_BLENDER = Matrix.Diagonal((1.0, -1.0, -1.0))
 
 
 def read_cameras(told):
-    """The motion and the lens of the file's `camera` (None: the scene's, or the only one) at the `frames` (None: the first) of
-    its animation `clip`, of `fps` frames a second (None: the file's own).
+    """The motion and the lens of a camera at frames of an animation.
 
-    A motion is `rotation` (3, 3), world from camera in OpenCV's axes, and `center` in metres, both relative to the position
-    and rotation that the object `at`, if any, has at the first frame. The lens is for a picture of `size` (width, height), by
-    default the scene's.
+    `camera` names the camera (None: the scene's, or the only one), `frames` the frames (None: the first), `clip` the
+    animation and `fps` its frames per second (None: the file's own).
+
+    A motion is `rotation` (3, 3), world from camera in OpenCV's axes, and `center` in metres. Both are relative to the
+    position and rotation of the object `at`, if given, at the first frame. The lens is for a picture of `size` (width,
+    height), by default the scene's.
     """
     unit, warnings = open_file(told["file"], told["kind"], told["root"], cameras=True, clip=told["clip"], fps=told["fps"])
     scene = bpy.context.scene

@@ -1,4 +1,6 @@
-"""Lists what a recipe may name in a .blend file: its objects, what each of them shows, and whether the scene is lit."""
+"""Lists the names in a .blend file that a recipe can use: its objects, their parts and collections, and whether the scene is
+lit.
+"""
 
 from __future__ import annotations
 
@@ -20,7 +22,7 @@ PICTURES = ("FILE", "SEQUENCE", "TILED", "MOVIE")
 
 
 def contents(told):
-    """Answer the request of `viewsphere.assets.scene_file`, which names `file`, its `root`, ascending `frames` besides the
+    """Answer the request of `viewsphere.assets.scene_file`. It names `file`, its `root`, ascending `frames` besides the
     first, patterns of objects that are `shown` although the file hides them, and the `most` triangles allowed.
     """
     unit, warnings = open_file(told["file"], "blend", told["root"])
@@ -154,7 +156,7 @@ def _object(one, seeing):
 
 
 def _collections(one):
-    """Names of the collections that hold the object or that it instances, and of all collections around these."""
+    """Names of the collections that hold the object or that it instances, and of all collections that contain these."""
     found = {collection.name for collection in one.users_collection}
     if one.instance_collection is not None:
         found.add(one.instance_collection.name)
@@ -162,7 +164,7 @@ def _collections(one):
 
 
 def _shines(owner):
-    """Return whether a world or a material gives light, as far as this is visible without rendering."""
+    """Return whether a world or a material gives light, as far as this can be seen without rendering."""
     if owner is None or (isinstance(owner, bpy.types.Material) and not owner.users):
         return False
     tree = owner.node_tree if getattr(owner, "use_nodes", True) else None

@@ -10,23 +10,22 @@ import numpy as np
 from .nodes import Reader
 
 SOLID = ("MESH", "META")
-"""Objects whose triangles are taken; text, curves and surfaces come as meshes when they are evaluated."""
+"""Types of objects that have triangles; text, curves and surfaces become meshes when they are evaluated."""
 
 LEFT_OUT = {"CURVES": "hair", "POINTCLOUD": "points", "VOLUME": "a volume", "GREASEPENCIL": "grease pencil"}
 STRANDS = "particle hair"
 NAMES_SAID = 5
 
 OWN_SLASH = "\u2215"
-"""Replaces a slash in an object's name."""
+"""Replacement for a slash in an object's name."""
 
 
 class Gathering:
     """Collects the triangles of all objects that a render would show.
 
-    `pieces` are triangles of one material, with files of arrays: positions, triangles, normals, uv0, uv1 and colors, the last
-    three None where there are none; `uvs` names the two layers. What an armature bends has `skin`, names of bones, and files of
-    each vertex's `bones` and `weights`. `placed` lists where each piece stands (a matrix) and which
-    part it belongs to.
+    `pieces` are triangles of one material, with files of arrays: positions, triangles, normals, uv0, uv1 and colors, the
+    last three None if absent; `uvs` names the two layers. A piece that an armature bends has `skin`, names of bones, and
+    files of each vertex's `bones` and `weights`. `placed` lists the matrix of each placed piece, and its part.
     """
 
     def __init__(self, folder, pictures, wanted, most):
@@ -80,7 +79,7 @@ class Gathering:
             self.placed.append({"pieces": list(pieces), "part": part_of(item, owner), "matrix": matrix})
 
     def _mesh(self, item):
-        """Numbers of an object's pieces, and how many triangles they are."""
+        """The numbers of an object's pieces, and their number of triangles."""
         slots = [slot.material for slot in item.material_slots]
         key = None if item.type == "META" else (item.data.as_pointer(), *(m and m.as_pointer() for m in slots))
         if key is not None and key in self._meshes:
@@ -117,7 +116,7 @@ class Gathering:
         return [self._piece(mesh, arrays, corners[slot_of == k].reshape(-1), numbers[k], skin) for k in np.unique(slot_of)]
 
     def _number(self, material):
-        """The number of a material; None for none."""
+        """The number of a material; None without a material."""
         return None if material is None else self._known[material.original.as_pointer()]
 
     def _arrays(self, mesh):
@@ -178,8 +177,8 @@ def strands(item):
 
 
 def part_of(item, owner):
-    """Name of an object's part: the object's name, or `owner/object` where `owner` instances it. A slash within a name is
-    replaced, so that the slash between the two names is unique (`viewsphere.assets.parts.own_part` does the same).
+    """The name of an object's part: the object's name, or `owner/object` if `owner` instances it. A slash within a name is
+    replaced, so that the slash between the two names is unique; `viewsphere.assets.parts.own_part` does the same.
     """
     own = [one.name.replace("/", OWN_SLASH) for one in (owner, item)]
     return own[1] if item.original == owner.original else "/".join(own)
@@ -193,7 +192,7 @@ def _layers(mesh, material):
 
 
 def _uses(told, key):
-    """Return every value of this name within an expression."""
+    """Return every value of this name in an expression."""
     if isinstance(told, dict):
         own = {told[key]} if isinstance(told.get(key), str) else set()
         return own.union(*(_uses(value, key) for value in told.values()))
@@ -201,7 +200,7 @@ def _uses(told, key):
 
 
 def _colors(mesh, material, corners, loops):
-    """Linear vertex colours (N, 4) of corners, where the material uses them or there is no material; else None."""
+    """Linear vertex colours (N, 4) of corners if the material uses them or is absent; else None."""
     attributes = mesh.color_attributes
     if material is None:
         names = [attributes[attributes.render_color_index].name] if len(attributes) else []
@@ -232,7 +231,9 @@ def _corner_values(data, name, width, mesh):
 
 
 def _welded(rows):
-    """Indices of the distinct rows of (N, K) float32, and for each row the number of its distinct row: by a verified hash."""
+    """Indices of the distinct rows of (N, K) float32, and for each row the number of its distinct row. Rows are found by a
+    verified hash.
+    """
     bits = np.ascontiguousarray(rows).view(np.uint32).astype(np.uint64)
     mixed = np.zeros(len(bits), np.uint64)
     for column in bits.T:
@@ -248,15 +249,15 @@ def _welded(rows):
 
 
 def listed(names):
-    """Names in a message: the first few."""
+    """The first few names, as a message lists them."""
     names = sorted(set(names))
     more = f" and {len(names) - NAMES_SAID} more" if len(names) > NAMES_SAID else ""
     return ", ".join(map(repr, names[:NAMES_SAID])) + more
 
 
 def _skin_of(item, mesh):
-    """Names of the bones that may bend an object, in their armatures' order, and of each vertex of its evaluated mesh numbers
-    of bones and their weights, (V, K) each; None for what no armature bends.
+    """The bones that may bend an object: their names, in their armatures' order, and for each vertex of its evaluated mesh
+    numbers of bones and weights, (V, K) each. None if no armature bends the object.
     """
     rigs = [m.object for m in item.modifiers if m.type == "ARMATURE" and m.object is not None and m.use_vertex_groups]
     groups = {group.name: group.index for group in item.vertex_groups}

@@ -1,7 +1,7 @@
-"""Node trees of materials as plain expressions, which `viewsphere.assets.readers.blender.nodes` works out.
+"""Node trees of materials as plain expressions, which `viewsphere.assets.readers.blender.nodes` evaluates.
 
-An expression is a number, a list of three or four (linear colours), or a dict `{"do": name, ...}` of other expressions. Parts
-of a tree that expressions cannot represent are listed by name in `lost`.
+An expression is a number, a list of three or four (linear colours), or a dict `{"do": name, ...}` of other expressions.
+`lost` lists the names of the parts of a tree that expressions cannot represent.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ STEPS = 256
 """Steps of the tables that approximate curves and colour ramps."""
 
 MOST = 1000
-"""Most nodes followed in one material, a node counted each time that it is used."""
+"""Most nodes that are followed in one material; a node counts each time that it is used."""
 
 PLAIN = {
     "color": [0.8, 0.8, 0.8],
@@ -31,8 +31,9 @@ PLAIN = {
 """A surface as expressions; `normal` is None, or a normal map's colours and strength."""
 
 GLTF_NODES = ("gltf material output", "gltf settings")
-"""Beginnings of the names of groups, in lower case, in which Blender's glTF importer and exporter keep properties that no
-shader has: https://docs.blender.org/manual/en/latest/addons/import_export/scene_gltf2.html, "Baked Ambient Occlusion".
+"""Beginnings of names of node groups, in lower case. Blender's glTF importer and exporter keep properties in these groups
+that no shader has: https://docs.blender.org/manual/en/latest/addons/import_export/scene_gltf2.html, "Baked Ambient
+Occlusion".
 """
 
 UNSEEN = {"alpha": 0.0}
@@ -51,11 +52,11 @@ UNKEPT = {
     "Anisotropic": "anisotropy",
     "Thin Film Thickness": "thin film",
 }
-"""Inputs of the Principled BSDF that are lost where they are not 0."""
+"""Inputs of the Principled BSDF that are lost unless they are 0."""
 
 
 class Reader:
-    """Reads one material's tree. `images` lists the pictures found so far, in all materials."""
+    """Reads one material's tree. `images` lists the pictures of all materials so far."""
 
     def __init__(self, images):
         self.images = images
@@ -79,7 +80,7 @@ class Reader:
         return told | PLAIN | look | {"occlusion": self._occlusion(tree)}
 
     def _occlusion(self, tree):
-        """glTF's ambient occlusion, the share of the ambient light that arrives; None where the tree has none."""
+        """glTF's ambient occlusion, the share of the ambient light that arrives; None if the tree has none."""
         for node in tree.nodes if tree else ():
             group = node.node_tree if node.bl_idname == "ShaderNodeGroup" else None
             if group is not None and group.name.lower().startswith(GLTF_NODES):
@@ -191,7 +192,7 @@ class Reader:
 
     @contextmanager
     def _feeding(self, socket):
-        """The node and output of `_source`, with `_groups` set, while the context lasts, to the groups around that node."""
+        """The node and output of `_source`. In the context, `_groups` are the groups around that node."""
         groups = list(self._groups)
         try:
             yield self._source(socket)
@@ -199,8 +200,8 @@ class Reader:
             self._groups = groups
 
     def _source(self, socket):
-        """The node and output that feed a socket, through reroutes and groups; None where the socket is not linked; (None,
-        input) where the link leads to a group's input socket with a value of its own.
+        """The node and output that feed a socket, through reroutes and groups. None if the socket is not linked; (None,
+        input) if the link leads to a group's input socket that has a value of its own.
         """
         while socket.is_linked and socket.links[0].is_valid and not socket.links[0].is_muted:
             output = socket.links[0].from_socket
@@ -238,7 +239,7 @@ class Reader:
         return VALUES.get(node.bl_idname, Reader._unknown)(self, node, output)
 
     def _unknown(self, node, output):
-        """The expression for a node that is not supported: the first linked input of the output's type, else a middle value."""
+        """The expression for an unsupported node: the first linked input of the output's type, else a middle value."""
         self._lose(f"the node {node.bl_label or node.bl_idname}")
         linked = [s for s in node.inputs if s.is_linked and s.type == output.type and s.type in ("RGBA", "VALUE")]
         if linked:
@@ -447,7 +448,7 @@ def _multiplied(*values):
 
 
 def _mixed(share, first, second):
-    """Two surfaces mixed field by field; of an invisible one (`UNSEEN`) only the alpha counts."""
+    """Two surfaces mixed field by field; an invisible surface (`UNSEEN`) contributes only its alpha."""
     whole = [field for field in PLAIN if field not in ("alpha", "normal")]
     if first is UNSEEN or second is UNSEEN:
         mixed = dict(second if first is UNSEEN else first)

@@ -26,8 +26,8 @@ NAMES_SAID = 8
 def open_file(file, kind, root, cameras=False, clip=None, fps=None):
     """Open the file as the scene, at the file's first frame. Returns the metres in one unit of the file, and warnings.
 
-    A USD file's cameras are imported if `cameras` is true. `clip` names the animation that is played. `fps` is the number of
-    frames in a second, None for the file's own.
+    A USD file's cameras are imported if `cameras` is true. `clip` names the animation to play. `fps` is the number of frames
+    per second; None: the file's own.
     """
     try:
         if kind == "blend":
@@ -50,9 +50,9 @@ def open_file(file, kind, root, cameras=False, clip=None, fps=None):
 
 
 def _import(file, kind, cameras, fps):
-    """Import a file into an empty scene of `fps` frames a second, None for the file's own, which Blender's reader of FBX sets
-    by itself. A glTF file has the times of its keys in seconds: it is imported again where these are no frames of the first
-    import.
+    """Import a file into an empty scene of `fps` frames per second; None: the file's own rate, which Blender's reader of FBX
+    sets itself. A glTF file stores the times of its keys in seconds. It is imported again if these times are not frames of
+    the first import.
     """
     rate = fps or own_rate(file, kind) or DEFAULT
     _import_at(file, kind, cameras, rate)
@@ -75,7 +75,7 @@ def _import_at(file, kind, cameras, rate):
 
 
 def _newer(kind):
-    """A warning where a file comes from a later Blender than this one."""
+    """A warning if a file comes from a later Blender than this one."""
     version = bpy.data.version[:2]
     if kind != "blend" or tuple(version) <= tuple(bpy.app.version[:2]):
         return []
@@ -84,7 +84,7 @@ def _newer(kind):
 
 
 def _libraries(root):
-    """Warnings about files that this one links: files outside of `root` are disabled, others may be missing."""
+    """Warnings about files that the open file links: files outside `root` are disabled, others may be missing."""
     said = []
     for library in list(bpy.data.libraries):
         path = Path(bpy.path.abspath(library.filepath, library=library.parent)).resolve()
@@ -97,12 +97,12 @@ def _libraries(root):
 
 
 def is_within(path, root):
-    """Return whether a file lies in the folder or below, links followed."""
+    """Return whether a file is in the folder or below, after following links."""
     return Path(path).resolve().is_relative_to(Path(root).resolve())
 
 
 def choose(scene, inside):
-    """Link the wanted objects into the scene; returns their addresses, None where all rendered objects are wanted."""
+    """Link the wanted objects into the scene; returns their addresses, None if all rendered objects are wanted."""
     if not inside:
         return None
     kind, name = inside
@@ -121,7 +121,7 @@ def choose(scene, inside):
 
 
 def _rendered(collection):
-    """Objects of a collection and of the collections in it, but for collections that renders do not show."""
+    """Objects of a collection and of the collections in it, without collections that renders do not show."""
     yield from dict.fromkeys(collection.objects)
     for child in collection.children:
         if not child.hide_render:

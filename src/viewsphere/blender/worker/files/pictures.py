@@ -1,4 +1,4 @@
-"""Pictures of materials: by their files, or by their bytes or pixels where no file exists that viewsphere can read."""
+"""Pictures of materials: their files, or their bytes or pixels if viewsphere cannot read a file of theirs."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 from .opening import is_within
 
 BY_BLENDER = {".bw", ".cin", ".dpx", ".exr", ".hdr", ".iris", ".j2c", ".jp2", ".psd", ".rgb", ".rgba", ".sgi"}
-"""Endings of files that only Blender decodes."""
+"""File suffixes that only Blender decodes."""
 
 FIRST_TILE = "1001"
 
@@ -18,8 +18,8 @@ FIRST_TILE = "1001"
 class Pictures:
     """The pictures that materials use, listed in `told`.
 
-    Each entry has a `name`, is_srgb, and one of `path`, `data` (a file that holds the bytes of a packed picture), `pixels` (an
-    array (H, W, 4) uint8, the first row on top), or none of these where the picture cannot be read.
+    Each entry has a `name`, `is_srgb`, and one of `path`, `data` (a file with the bytes of a packed picture) and `pixels`
+    (an array (H, W, 4) uint8, the first row on top). A picture that cannot be read has none of the three.
     """
 
     def __init__(self, folder, root):
@@ -29,7 +29,9 @@ class Pictures:
         self._known = {}
 
     def index(self, image, lose):
-        """The picture's index in `told`; a new picture is added. `lose` is called with the name of what cannot be kept."""
+        """The picture's index in `told`; a new picture is added. Calls `lose` with the name of a picture that cannot be
+        kept.
+        """
         key = image.as_pointer()
         if key not in self._known:
             self._known[key] = len(self.told)

@@ -1,4 +1,4 @@
-"""A file's animation: its first and last frame, whether anything moves, and going to a frame."""
+"""A file's animation: its first and last frame, its motion, and moving the scene to a frame."""
 
 from __future__ import annotations
 
@@ -14,10 +14,11 @@ TIME_NODES = {"GeometryNodeInputSceneTime", "GeometryNodeSimulationInput"}
 
 
 def play(clip):
-    """Let every object play the animation `clip`; None: the animation that the file plays, the first one in imported files.
+    """Let every object play the animation `clip`; None: the animation that the file plays, which is the first one in
+    imported files.
 
-    FBX files call an animation a take; importers turn each into an action, named `<moved object>|<animation>`. An object that
-    the first animation does not move plays the first one that does.
+    FBX files call an animation a take. Importers turn each take into actions named `<moved object>|<animation>`. An object
+    that the first animation does not move plays the first one that does.
     """
     chosen = [action for action in bpy.data.actions if clip in (action.name, action.name.rpartition("|")[2])]
     if clip is not None and not chosen:
@@ -49,7 +50,7 @@ def clip_spans():
 
 
 def _span(ranges):
-    """The first and the last frame of all ranges."""
+    """The first and the last frame of several ranges."""
     return round(min(first for first, _ in ranges)), round(max(last for _, last in ranges))
 
 
@@ -68,7 +69,7 @@ def set_span(scene, kind):
 
 
 def timeline(scene):
-    """First and last frame, frames a second, whether anything moves, and first and last frame of each animation."""
+    """First and last frame, frames per second, whether anything moves, and first and last frame of each animation."""
     return {
         "first": scene.frame_start,
         "last": scene.frame_end,
@@ -88,7 +89,7 @@ def curves(action, slot=None):
 
 
 def go_to(scene, frame, after=None):
-    """Go to a frame; simulations are played up to it, from the first frame on, or from the last shown frame, `after`."""
+    """Go to a frame. Simulations are played up to it, from the first frame or from the last shown frame, `after`."""
     if is_simulated(scene):
         for between in range(scene.frame_start if after is None else after + 1, frame):
             scene.frame_set(between)

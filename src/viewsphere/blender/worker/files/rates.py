@@ -1,4 +1,4 @@
-"""The frames a second of a file: the file's own rate, or the rate whose frames its times match."""
+"""The frames per second of a file: its own rate, or the rate that its times match."""
 
 from __future__ import annotations
 
@@ -16,17 +16,17 @@ DEFAULT = 24.0
 """The rate that Blender assumes for a file that gives none."""
 
 USUAL = (24.0, 25.0, 30.0, 50.0, 60.0, 24000 / 1001, 30000 / 1001, 60000 / 1001, 48.0, 90.0, 100.0, 120.0)
-"""Rates that animations are sampled at, the likeliest first."""
+"""Usual rates of animations, the likeliest first."""
 
 NEAR = 2e-3
-"""Frames by which a time may miss a frame: files hold their times in single precision."""
+"""Largest distance of a time from a frame, in frames: files store times in single precision."""
 
 LEAST, MOST = 1.0, 1000.0
 
 
 def own_rate(file, kind):
-    """Frames a second of a USD or Alembic file; None for other kinds, and if the file has no rate. Blender's reader
-    sets the rate of an FBX file.
+    """Frames per second of a USD or Alembic file; None for other kinds, and for files without a rate. Blender's reader sets
+    the rate of an FBX file.
     """
     if kind in ("usd", "usda", "usdc", "usdz"):
         return _usd_rate(file)
@@ -40,7 +40,8 @@ def set_rate(scene, rate):
 
 
 def _usd_rate(file):
-    """The time codes a second of a USD file, which Blender takes for frames; by the bindings of USD that Blender ships.
+    """The time codes per second of a USD file, which Blender treats as frames. The USD bindings that Blender ships read
+    them.
 
     https://openusd.org/release/api/class_usd_stage.html, timeCodesPerSecond.
     """
@@ -56,11 +57,11 @@ def _usd_rate(file):
 
 
 def _alembic_rate(data):
-    """The rate of the first even time sampling of an Alembic file (Ogawa) with more than one sample.
+    """The rate of an Alembic file (Ogawa): that of its first even time sampling with more than one sample.
 
-    https://github.com/alembic/alembic, lib/Alembic/AbcCoreOgawa/ReadUtil.cpp, ReadTimeSamplesAndMax: a group is a count and
-    the places of its children; the fifth child of the root has the time samplings, each with its number of samples, the
-    seconds of a cycle and the times in the first one.
+    https://github.com/alembic/alembic, lib/Alembic/AbcCoreOgawa/ReadUtil.cpp, ReadTimeSamplesAndMax. A group is a count and
+    the positions of its children. The fifth child of the root has the time samplings: for each the number of samples, the
+    seconds of a cycle, and the times in the first cycle.
     """
     with suppress(struct.error, IndexError):
         (root,) = struct.unpack_from("<Q", data, 8)
@@ -77,8 +78,8 @@ def _alembic_rate(data):
 
 
 def key_rate():
-    """The rate of an imported file that holds times alone: the likeliest one of which all keys' times are multiples, else the
-    one of the closest keys if it fits all. None where the keys are at no even times.
+    """The rate of an imported file that stores times but no rate. It is the likeliest rate whose frames include all keys'
+    times, else the rate of the two closest keys if it fits all. None if no rate fits.
     """
     scene = bpy.context.scene
     rate = scene.render.fps / scene.render.fps_base

@@ -1,7 +1,7 @@
 """Reads model files through Blender into plain arrays and expressions, for `viewsphere.assets.readers.blender.reading`.
 
-A frame is evaluated by rendering it with a render engine that paints nothing and only collects the evaluated objects: so
-modifiers, particles and visibility have their settings for renders, not those for the viewport.
+To evaluate a frame, Blender renders it with a render engine that paints nothing and collects the evaluated objects.
+Modifiers, particles and visibility then have their render settings, not their viewport settings.
 """
 
 from __future__ import annotations
@@ -34,11 +34,11 @@ LINES = ("CURVE", "MESH")
 def read(told):
     """Open `told["file"]`, of a `told["kind"]`, and write its arrays at a frame to `told["folder"]`.
 
-    `inside` selects a part of a .blend file: `["Object", name]` or `["Collection", name]`, or nothing for the whole file;
-    `shown` names objects that count although renders do not show them. Files that the model names must lie below `root`,
-    None for anywhere; `most` is the largest number of triangles allowed. `frame` None is the first one; `after` is the frame
+    `inside` selects a part of a .blend file: `["Object", name]`, `["Collection", name]`, or nothing for the whole file.
+    `shown` names objects that count although renders do not show them. Files that the model names must be below `root`;
+    None: anywhere. `most` is the largest number of triangles allowed. `frame` None is the first frame. `after` is the frame
     of the previous answer if the file is still open, else None.
-    Raises ValueError in one line for what cannot be read.
+    Raises ValueError with one line for unreadable files.
     """
     if told.get("after") is None:
         unit, warnings = open_file(told["file"], told["kind"], told["root"], clip=told.get("clip"), fps=told.get("fps"))
@@ -115,7 +115,7 @@ def read_timeline(told):
 
 
 def prepare(scene):
-    """Set up a render of a few pixels by a camera of our own, without compositing or sequencing."""
+    """Set up a render of a few pixels by a separate camera, without compositing or sequencing."""
     render = scene.render
     render.resolution_x = render.resolution_y = 8
     render.resolution_percentage = 100
@@ -126,15 +126,13 @@ def prepare(scene):
 
 
 class Marks:
-    """A collector of the objects that have the property, or are lanes by their names: `found` lists them, in the order of
-    names.
-    """
+    """Collects the objects that have the property or a lane's name. `found` lists them in the order of their names."""
 
     def __init__(self, wanted):
         self.found, self._wanted = [], wanted
 
     def take(self, depsgraph):
-        """Collect all such requested objects of a depsgraph."""
+        """Collect all requested objects of a depsgraph that have the property or a lane's name."""
         there = sorted(depsgraph.objects, key=lambda one: one.name)
         below = {}
         for one in there:
@@ -160,7 +158,7 @@ def _told(one, children):
 
 
 def _lines(one):
-    """Points in the world, edges between them, and whether there are faces, which leave the first two empty."""
+    """Points in the world, the edges between them, and whether there are faces; with faces the first two are empty."""
     if one.type not in LINES:
         return [], [], False
     mesh = one.to_mesh()
@@ -178,7 +176,7 @@ def _plain(value):
 
 
 class Points:
-    """Collects the points of what a render would show: `found` are names, places and the numbers of those above."""
+    """Collects the points of rendered objects: `found` has the name, the position and the parent's number of each point."""
 
     def __init__(self, wanted):
         self.found, self._wanted = [], wanted
@@ -213,7 +211,7 @@ class Points:
 
 
 def _said(one):
-    """The name of the point that an object marks; empty for any other object."""
+    """The name of the point that an object marks; empty for other objects."""
     said = one.get(POINT_PROPERTY)
     if said and not isinstance(said, str):
         return one.name.removeprefix(PREFIX)

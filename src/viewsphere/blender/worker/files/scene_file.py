@@ -29,9 +29,7 @@ def open_scene(told):
 
 
 def reveal(scene, names):
-    """Let renders show the objects of these names; an object hidden at the first frame is shown with all its children,
-    grandchildren and so on.
-    """
+    """Let renders show the objects of these names. An object hidden at the first frame is shown with all its descendants."""
     there = set(scene.collection.objects)
     for one in (bpy.data.objects[name] for name in names if name in bpy.data.objects):
         for member in (one, *(one.children_recursive if one.hide_render else ())):
@@ -45,7 +43,7 @@ def reveal(scene, names):
 def _fix(one, name, value):
     """Set a property permanently, despite the file's drivers and animations, by a driver, which overrides animations.
 
-    Objects from a library cannot be given drivers, but their animation curves can be muted.
+    Objects from a library cannot have drivers; their animation curves are muted.
     """
     if one.animation_data is not None and one.library is None:
         one.driver_remove(name)
@@ -67,7 +65,7 @@ def _all_curves(animation):
 
 
 def _only_color(scene):
-    """Switch off effects that would not fit the labels, which show one moment, one view and the triangles of modifiers."""
+    """Switch off effects that labels do not show: labels have one moment, one view and the triangles of modifiers."""
     render = scene.render
     render.use_motion_blur = render.use_multiview = render.use_freestyle = render.use_sequencer = render.use_stamp = False
     render.use_border = render.use_crop_to_border = False

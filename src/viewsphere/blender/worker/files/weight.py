@@ -21,7 +21,7 @@ def check_weight(scene, wanted, most):
 
 
 def expected_triangles(item, render):
-    """Triangles of an object, and the modifier that makes the most of them; modifiers of unknown effect count as none."""
+    """The expected triangles of an object, and the modifier that makes the most of them; unknown modifiers count as none."""
     faces, loops = len(item.data.polygons), len(item.data.loops)
     cause, most = "", 1.0
     for modifier in item.modifiers:
@@ -38,7 +38,7 @@ def expected_triangles(item, render):
 
 
 def _factor(modifier, render, corners):
-    """The number of faces that a modifier makes of one face with this number of corners."""
+    """The number of faces that a modifier makes from one face with this number of corners."""
     if modifier.type in ("SUBSURF", "MULTIRES"):
         levels = modifier.render_levels
         if render.use_simplify:

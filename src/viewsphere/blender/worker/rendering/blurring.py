@@ -1,4 +1,4 @@
-"""Motion blur: objects and the camera are given keys for as long as the shutter is open, and none afterwards."""
+"""Motion blur: objects and the camera have keys while the shutter is open, and none afterwards."""
 
 from __future__ import annotations
 
@@ -14,13 +14,15 @@ STEPS = 3
 """Cycles evaluates 2 ** STEPS + 1 moments."""
 
 ORDER = "viewsphere order"
-"""Custom property of a placed object: its place among all."""
+"""Custom property of a placed object: its number among all."""
 
 
 @contextmanager
 def exposed(scene, told):
-    """Let what `told` names move while a picture is rendered: `objects`, by their places, along `matrices`, and the `camera`
-    along its poses, evenly from half a frame before the scene's frame to half a frame after. None: nothing moves.
+    """Move objects and the camera while a picture is rendered; None: nothing moves.
+
+    `told` has `objects`, by their numbers, with their `matrices`, and the poses of the `camera`. They move evenly from half
+    a frame before the scene's frame to half a frame after.
     """
     if told is None:
         yield

@@ -1,4 +1,4 @@
-"""The compositor of a file, which affects only the colours."""
+"""The compositor of a file, which affects only colours."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ def stop_writing():
 
 
 def set_up(scene):
-    """Have pictures written as scene-linear floating point numbers, composited at full precision on the processor."""
+    """Let Blender write pictures as scene-linear floating point numbers, composited at full precision on the processor."""
     render, image = scene.render, scene.render.image_settings
     if hasattr(image, "media_type"):  # Blender 5.0 and later
         image.media_type = "IMAGE"
@@ -91,7 +91,7 @@ def read_picture(file):
 
 
 def with_alpha(composed, rendered):
-    """The composed picture, with the rendered alpha where the compositor dropped its own: else no background would show."""
+    """The composed picture, with the rendered alpha if the compositor dropped it; without alpha no background would show."""
     if composed.shape == rendered.shape and (composed[..., 3] == 1).all():
         composed[..., 3] = rendered[..., 3]
     return composed

@@ -1,7 +1,7 @@
-"""Renders the staged scene with an exact camera, and hands the pixels over as arrays.
+"""Renders the staged scene with an exact camera, and writes the pixels as arrays.
 
-In a Blender without windows the image 'Render Result' has no pixels; Cycles' result has them while its engine runs, and is
-read then. The pictures of the other renderers are read from a file.
+In a Blender without windows the image 'Render Result' has no pixels. Cycles' result has pixels while its engine runs, and is
+read then. Pictures of the other renderers are read from a file.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from .blurring import exposed
 from .posing import camera_matrix
 
 SENSOR = 36.0
-"""Width of the camera's sensor in millimetres; any value will do, as the focal length is given in proportion."""
+"""Width of the camera's sensor in millimetres. Any value works, because the focal length is proportional to it."""
 
 DRAWN_OFF = {
     "5": (0.009, -0.127),
@@ -28,8 +28,8 @@ DRAWN_OFF = {
     "16": (0.040, -0.035),
     "32": (0.031, -0.094),
 }
-"""Pixels, to the right and down, by which Workbench's pictures are displaced, by number of samples, as measured: Workbench
-shifts its sample pattern until one sample lies in the middle.
+"""Displacement of Workbench's pictures, in pixels to the right and down, by number of samples, as measured: Workbench
+shifts its sample pattern until one sample is in the middle.
 """
 
 OTHERS_HIGHER = 0.1
@@ -40,11 +40,12 @@ PASSES = {"index": ("use_pass_object_index", ("Object Index", "IndexOB")), "dept
 
 
 def render(told):
-    """Write (H, W, 4) float32 to `out`: scene-linear, premultiplied, the first row on top; empty outside of the border.
+    """Write (H, W, 4) float32 to `out`: scene-linear, premultiplied, the first row on top, empty outside the border.
 
-    With `blur`, see `blurring.exposed`, what moves is blurred. Each of the `passes` is written beside the colours, such as
-    `picture.index.npy` beside `picture.npy`: index and depth (H, W, 1), light (H, W, 12) as `passes.light` has it, objects
-    (H, W, 3), their albedo without the ground's, and materials (H, W, 2). See `passes.sampled` for what the last two change.
+    `blur` blurs moving things, see `blurring.exposed`. Each of the `passes` is written beside the colours, such as
+    `picture.index.npy` beside `picture.npy`: index and depth (H, W, 1), light (H, W, 12) as in `passes.light`, objects (H,
+    W, 3), their albedo without the ground's, and materials (H, W, 2). `passes.sampled` describes how the last two change the
+    sampling.
     """
     scene = bpy.context.scene
     view = told["camera"]
@@ -86,7 +87,7 @@ def _needed(told):
 
 
 def _chosen(found, told):
-    """The requested pictures by the names of requests, from those that the renderer gives."""
+    """The requested pictures by the names of requests, out of the renderer's pictures."""
     chosen = {"picture": found["Combined"]}
     for name in told["passes"]:
         if name == "light":
@@ -145,7 +146,7 @@ def _set_border(scene, border, view):
 
 
 def _rendered(names, composed):
-    """These passes of one render of Cycles' by name, (H, W, C) float32 each, the first row on top; if a compositor is used, the
+    """The named passes of one render of Cycles, (H, W, C) float32 each, the first row on top. If a compositor is used, the
     colours come from the file `composed`, which it writes.
     """
     found = {}
@@ -184,7 +185,7 @@ def _rendered(names, composed):
 def _drawn(scene, file):
     """The colours of one picture, (H, W, 4) float32, the first row on top.
 
-    Where the compositor drops the alpha, the picture is drawn again without the compositor to get it.
+    If the compositor drops the alpha, the picture is drawn again without the compositor.
     """
     drawn = _written(scene, file)
     if scene.render.film_transparent and compositing.is_used(scene) and (drawn[..., 3] == 1).all():
@@ -206,7 +207,7 @@ def _written(scene, file):
 
 
 def _whole(pixels, border, view):
-    """The rendered part within the border, put in its place in a whole picture that is empty elsewhere."""
+    """A whole picture that contains the rendered part within the border and is empty elsewhere."""
     if border is None:
         return pixels
     left, top, right, bottom = border

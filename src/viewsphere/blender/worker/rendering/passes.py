@@ -12,7 +12,7 @@ SHORT = {
     "Diffuse": "Diff", "Glossy": "Gloss", "Transmission": "Trans", "Direct": "Dir", "Indirect": "Ind", "Color": "Col",
     "Emission": "Emit", "Environment": "Env",
 }  # fmt: skip
-"""Words of the passes' names as Blender before 5 has them."""
+"""Words in the passes' names before Blender 5."""
 
 LIGHT = (
     *(f"{kind} {what}" for kind in KINDS for what in ("Direct", "Indirect", "Color")),
@@ -53,8 +53,8 @@ def ask_for_materials(layer):
 
 
 def light(found, is_open):
-    """Albedo, diffuse light, all other light and emission, (H, W, 12), of the found passes of light; with `is_open` without
-    the background's.
+    """Albedo, diffuse light, all other light and emission, (H, W, 12), from the rendered passes of light. With `is_open`,
+    the light of the background is left out.
     """
     pairs = zip(NAMES[: len(LIGHT)], NAMES[len(LIGHT) :], strict=True)
     given = {name: found[name] if name in found else found[before] for name, before in pairs}
@@ -71,7 +71,7 @@ def materials(found):
 
 @contextmanager
 def sampled(scene, names, least):
-    """Change how Cycles samples during the context, for some passes. For `objects` the ground is hidden and nothing is lit. For
+    """Change how Cycles samples in the context, for some passes. For `objects` the ground is hidden and nothing is lit. For
     `materials` each pixel has one sample at its centre, which ignores surfaces less opaque than `least`.
     """
     wanted = []

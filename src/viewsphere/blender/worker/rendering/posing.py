@@ -7,6 +7,6 @@ from mathutils import Matrix
 
 
 def camera_matrix(rotation, center):
-    """World from Blender's camera, which looks along -Z with +Y up, from rows of OpenCV axes and a place."""
+    """World from Blender's camera, which looks along -Z with +Y up, from rows of OpenCV axes and a position."""
     turned = np.array(rotation).T @ np.diag([1, -1, -1])
     return Matrix.Translation(center) @ Matrix(turned.tolist()).to_4x4()

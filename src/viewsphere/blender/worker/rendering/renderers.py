@@ -33,12 +33,12 @@ def set_up(scene, settings):
 
 
 def is_drawn(scene):
-    """Return whether the scene's renderer draws through OpenGL, and so gives pictures only by way of files."""
+    """Return whether the scene's renderer draws through OpenGL, so that its pictures have to be read from files."""
     return scene.render.engine != "CYCLES"
 
 
 def try_drawing(told):
-    """Draw a tiny picture; returns the seconds taken and the driver's name. Where OpenGL does not work, Blender may crash."""
+    """Draw a tiny picture; returns the seconds it took and the driver's name. Blender may crash if OpenGL does not work."""
     bpy.ops.wm.read_factory_settings(use_empty=True)
     scene = bpy.context.scene
     _choose(scene.render, told["renderer"])
@@ -84,7 +84,9 @@ def _set_up_cycles(scene, settings):
 
 
 def _denoise(cycles, how, samples):
-    """Switch on Open Image Denoise; with few samples without the normals pass, whose noise the denoiser would preserve."""
+    """Switch on Open Image Denoise. With few samples it gets no normals pass, because the denoiser would preserve that
+    pass's noise.
+    """
     cycles.use_denoising = how != "off"
     if how != "off":
         cycles.denoiser = "OPENIMAGEDENOISE"
@@ -124,7 +126,7 @@ def _set_up_eevee(scene, settings):
 
 
 def _set_up_workbench(scene, settings):
-    """Workbench's settings: textures in the light of the studio (`studio`)."""
+    """Workbench's settings: textures, lit by the studio (`studio`)."""
     compositing.set_up(scene)
     _filter_evenly()
     display = scene.display
@@ -136,8 +138,8 @@ def _set_up_workbench(scene, settings):
 
 
 def _filter_evenly():
-    """Filter textures without regard to direction: with anisotropic filters, Mesa's software OpenGL hangs on
-    a texture that repeats up to a horizon.
+    """Filter textures equally in all directions: with anisotropic filters, Mesa's software OpenGL hangs on a texture that
+    repeats up to a horizon.
     """
     bpy.context.preferences.system.anisotropic_filter = "FILTER_0"
 

@@ -75,14 +75,14 @@ class Graph:
         return self.math("SUBTRACT", 1.0, value) if isinstance(value, bpy.types.NodeSocket) else 1.0 - value
 
     def mix(self, share, first, second):
-        """A mix of two closures (shaders); None stands for a closure that neither reflects nor hides anything."""
+        """A mix of two closures (shaders); None is a closure that neither reflects nor hides anything."""
         if not isinstance(share, bpy.types.NodeSocket) and share in (0, 1):
             return second if share else first
         inputs = {0: share} | {k: closure for k, closure in ((1, first), (2, second)) if closure is not None}
         return self.node("ShaderNodeMixShader", inputs).outputs[0]
 
     def add(self, first, second):
-        """The sum of two closures (shaders); None stands for no closure."""
+        """The sum of two closures (shaders); None is no closure."""
         if first is None or second is None:
             return first or second
         return self.node("ShaderNodeAddShader", {0: first, 1: second}).outputs[0]

@@ -1,4 +1,4 @@
-"""The ground's end: far behind the scene it fades into the sky, as the raster engine's does."""
+"""The end of the ground: far behind the scene it fades into the sky, as in the raster engine."""
 
 from __future__ import annotations
 
@@ -9,16 +9,16 @@ import bpy
 from .graph import Graph
 
 SKY = "viewsphere sky"
-"""Name of the node that sets whether the sky is seen."""
+"""Name of the node that sets whether the sky is visible."""
 
 
 def fade(material, middle, fading, sky):
-    """Let the camera see the sky instead of the ground where the ground has faded; light and mirrors meet the whole ground.
+    """Show the camera the sky instead of the faded ground; light and mirrors meet the whole ground.
 
-    A transparent shader would be sampled at random, with noise; a holdout, or emission of the sky's light where the film is not
-    transparent, has none. `fading`: metres behind the `middle` at which fading begins and ends, and the sine of the angle
-    between view and ground at which it begins for flat views, which have faded altogether at the horizon. `sky`: the visible
-    sky's picture, and its turn in degrees.
+    A transparent shader would be sampled at random, with noise. A holdout has no noise, nor does emission of the sky's light
+    if the film is opaque. `fading`: metres behind the `middle` at which fading begins and ends, and the sine of the angle
+    between view and ground at which flat views begin to fade; at the horizon they have faded. `sky`: the visible sky's
+    picture, and its turn in degrees.
     """
     graph = Graph(material.node_tree)
     output = next(node for node in material.node_tree.nodes if node.type == "OUTPUT_MATERIAL").inputs["Surface"]
@@ -31,7 +31,7 @@ def fade(material, middle, fading, sky):
 
 
 def show_sky(is_shown):
-    """Choose what shows where the ground has faded: the sky, or nothing (transparency)."""
+    """Choose the background behind the faded ground: the sky, or nothing (transparency)."""
     for material in bpy.data.materials:
         node = material.node_tree.nodes.get(SKY) if material.node_tree is not None else None
         if node is not None and node.outputs[0].default_value != is_shown:
@@ -39,7 +39,9 @@ def show_sky(is_shown):
 
 
 def _gone(graph, middle, fading):
-    """The share of the ground that has faded; by few nodes, because they are evaluated for each sample of the ground."""
+    """The share of the ground that has faded. It takes few nodes, because Cycles evaluates them for each sample of the
+    ground.
+    """
     place = graph.node(
         "ShaderNodeVectorTransform", {0: tuple(middle)}, vector_type="POINT", convert_from="WORLD", convert_to="CAMERA"
     )

@@ -15,14 +15,16 @@ from mathutils import Matrix, Vector
 KINDS = {"sun": "SUN", "point": "POINT", "spot": "SPOT", "area": "AREA"}
 
 EVEN = 0.05
-"""Largest relative deviation of the light within one cell of the map that Cycles samples the sky's light by."""
+"""Largest relative deviation of the light within one cell of the map from which Cycles samples the sky."""
 
 FEWEST = 32
-"""Fewest columns of the map that Cycles samples the sky's light by."""
+"""Fewest columns of the map from which Cycles samples the sky."""
 
 
 def add_light(scene, told):
-    """Add a lamp that the camera does not see. Its strength is its brightest colour channel, so that colours stay within 1."""
+    """Add a lamp that is invisible to the camera. Its strength is its brightest colour channel, so that colours stay within
+    1.
+    """
     kind = told["kind"]
     data = bpy.data.lights.new(kind, KINDS[kind])
     color = told["irradiance"]
@@ -47,7 +49,7 @@ def add_light(scene, told):
 
 
 def _facing(position, direction):
-    """The matrix of a lamp that shines along its -Z in this direction, an area lamp's width being level."""
+    """The matrix of a lamp that shines along its -Z in this direction; the width of an area lamp is level."""
     direction = Vector(direction) if any(direction) else Vector((0, 0, -1))
     return Matrix.Translation(position) @ direction.to_track_quat("-Z", "Y").to_matrix().to_4x4()
 

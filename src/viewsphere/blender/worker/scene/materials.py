@@ -1,19 +1,19 @@
-"""glTF 2.0 materials as Cycles' nodes: the fields of `viewsphere.assets.mesh.Material`, with the meaning that the raster engine
-gives them.
+"""glTF 2.0 materials as Cycles' nodes: the fields of `viewsphere.assets.mesh.Material`, as the raster engine interprets
+them.
 
-A Principled BSDF covers most fields: glTF and Cycles share metals and dielectrics, roughness squared, Fresnel between the
-reflectance at normal incidence and 1, a clear coat of ior 1.5. Beside it:
+A Principled BSDF covers most fields. glTF and Cycles share metals and dielectrics, roughness squared, Fresnel between the
+reflectance at normal incidence and 1, and a clear coat of ior 1.5. In addition:
 
-- Occlusion textures are left out: light that does not reach a crevice does not reach it here.
+- Occlusion textures are left out: Cycles computes the light that does not reach a crevice.
 - Reflections and emission of a BLEND material stay when its alpha falls (glass is often made by alpha), except where the
   material is almost clear. A material that transmits is never cut out: labels count it as solid, too.
-- Transmitting surfaces without a thickness are thin and refract nothing: the light from straight behind passes, tinted by the
-  base colour, and the square of the roughness is the share of it that is scattered. A picture's alpha has no colours: where a
-  background is laid behind a finished picture, the background shows by the smallest of the three tints, and the surplus of the
-  other two is filled with light of the surroundings.
-- Those with a thickness refract, however thick what they bound is; in a picture's alpha they are opaque.
-- Shadow rays pass both straight on, as through thin glass, so clear glass casts light shadows.
-- Unlit colours are seen as they are, from the camera and in mirrors; they light nothing and cast shadows.
+- Transmitting surfaces without a thickness are thin and refract nothing. The light from straight behind passes, tinted by the
+  base colour; the square of the roughness is the share that is scattered. A picture's alpha has no colours: if a background
+  is laid behind a finished picture, it shows by the smallest of the three tints. Light of the surroundings fills the surplus
+  of the other two.
+- Transmitting surfaces with a thickness refract, whatever the thickness; in a picture's alpha they are opaque.
+- Shadow rays pass both kinds straight on, as through thin glass, so clear glass casts light shadows.
+- Unlit colours are shown unchanged, to the camera and in mirrors; they light nothing and cast shadows.
 - All surfaces have two sides.
 """
 
@@ -30,7 +30,7 @@ from .meshes import COLORS
 from .textures import Textures
 
 UNEXPOSED = 1 / 0.7
-"""Radiance of an unlit white surface, which the view shows as white: one over `viewsphere.rendering.view.EXPOSURE`."""
+"""Radiance of an unlit white surface, which the view shows as white: 1 / `viewsphere.rendering.view.EXPOSURE`."""
 
 TOTAL = 0.99
 """Largest reflectance of dielectrics at normal incidence, as in Cycles."""
@@ -39,7 +39,7 @@ GREY = 0.02
 """Colours whose red, green and blue differ by less count as grey."""
 
 SHARP = 0.1
-"""Roughness up to which thin glass counts as clear: it would scatter a hundredth of the light."""
+"""Roughness up to which thin glass counts as clear: at this roughness it would scatter a hundredth of the light."""
 
 
 @dataclass(frozen=True)
@@ -63,8 +63,8 @@ class _Look:
 def build_material(told, images, has_uv, has_colors, is_traced=True):
     """A Blender material from a `Material` as a dict and `meshes.build_images` of its mesh.
 
-    has_uv: of both sets of coordinates, whether the mesh has them; textures that need others count as absent. Where the dict
-    has `fixed_metallic` or `fixed_roughness`, and not None, they stand for the factor and its texture.
+    has_uv: for both sets of coordinates, whether the mesh has them; textures that need absent coordinates are ignored. If
+    the dict has `fixed_metallic` or `fixed_roughness`, and not None, they replace the factor and its texture.
     """
     material = bpy.data.materials.new(told["name"] or "material")
     if material.node_tree is None:  # before Blender 5
@@ -74,7 +74,7 @@ def build_material(told, images, has_uv, has_colors, is_traced=True):
 
 
 def fill_material(material, told, images, has_uv, has_colors, is_traced=True):
-    """Give a material the nodes of `build_material`, in place of those that it has."""
+    """Replace the nodes of a material by those of `build_material`."""
     material.node_tree.nodes.clear()
     graph = Graph(material.node_tree)
     textures = Textures(graph, images, tuple(has_uv))
@@ -93,14 +93,14 @@ def fill_material(material, told, images, has_uv, has_colors, is_traced=True):
 
 
 def _single_sided(graph, surface):
-    """The surface with a back that is invisible to cameras; shadows and reflections do not change."""
+    """The surface with a back that cameras do not see; shadows and reflections do not change."""
     camera = graph.node("ShaderNodeLightPath").outputs["Is Camera Ray"]
     back = graph.node("ShaderNodeNewGeometry").outputs["Backfacing"]
     return graph.mix(graph.product(camera, back), surface, _nothing(graph))
 
 
 def _tell(graph, told, look):
-    """Fill the passes of materials where the surface counts as seen; these nodes are evaluated only for these passes."""
+    """Fill the passes of materials where the surface counts as seen; Cycles evaluates these nodes only for these passes."""
     seen = 1.0
     if look.alpha != 1 and told["transmission"] == 0:
         seen = graph.complement(_is_less(graph, look.alpha, graph.node("ShaderNodeValue", name=passes.LEAST).outputs[0]))
@@ -109,7 +109,9 @@ def _tell(graph, told, look):
 
 
 def build_plain(told, images, has_uv):
-    """A material for Workbench, which shows the base colour's picture unchanged, or without one the base colour factor."""
+    """A material for Workbench, which shows the base colour's picture unchanged, or the base colour factor without a
+    picture.
+    """
     material = bpy.data.materials.new(told["name"] or "material")
     material.diffuse_color = [min(max(c, 0.0), 1.0) for c in told["base_color"]]
     material.metallic, material.roughness = told["metallic"], told["roughness"]
@@ -259,7 +261,7 @@ def _lit(graph, told, look, is_traced):
 def _more_shine(graph, alpha):
     """The share of mirrored light that a blended surface adds beyond its opacity.
 
-    Only camera rays see the addition. Between surfaces, it would make more light leave than arrives.
+    Only camera rays include the addition. Between surfaces, more light would leave than arrives.
     """
     shown = graph.math("MINIMUM", graph.product(8.0, alpha), 1.0)
     camera = graph.node("ShaderNodeLightPath").outputs["Is Camera Ray"]
@@ -267,7 +269,7 @@ def _more_shine(graph, alpha):
 
 
 def _principled(graph, told, look, color, transmission=0.0):
-    """Return the opaque surface, or that of a transmitting solid. A black dielectric only mirrors and emits."""
+    """Return the opaque surface, or the surface of a transmitting solid. A black dielectric only mirrors and emits."""
     reflectance = _reflectance(told)
     inputs = {
         "Base Color": color,
@@ -290,8 +292,8 @@ def _principled(graph, told, look, color, transmission=0.0):
 
 
 def _solid(graph, told, look, thin):
-    """The surface of solid glass, which refracts what eyes and mirrors see. To shadow rays it is thin, and so to the rays that
-    look for light from scattering surfaces: they would find once more the light that shadow rays have let through.
+    """The surface of solid glass, which refracts the view and mirrors. For shadow rays it is thin. So it is for rays from
+    scattering surfaces that look for light: they would count the light of the shadow rays a second time.
     """
     # The node tints what passes by the root of its colour.
     squared = graph.vector("MULTIPLY", look.color, look.color)
@@ -315,7 +317,7 @@ def _through(graph, told, look, is_traced):
 
 
 def _clear(graph, color, left, tint):
-    """Light from straight behind, times `tint`, which is the glass's colour times the share `left` that is not mirrored."""
+    """Light from straight behind, times `tint`: the glass's colour times the share `left` that is not mirrored."""
     excess = _above_least(graph, color)
     if not isinstance(excess, bpy.types.NodeSocket) and max(excess) < GREY:
         return _nothing(graph, tint)
@@ -336,7 +338,7 @@ def _above_least(graph, color):
 
 
 def _fresnel(graph, ior, normal):
-    """Fresnel reflectance of a thin sheet, equal from both sides: Cycles' node alone takes the back for a solid's inside."""
+    """Fresnel reflectance of a thin sheet, equal from both sides: Cycles' own node treats the back as a solid's inside."""
     back = graph.node("ShaderNodeNewGeometry").outputs["Backfacing"]
     turned = graph.math("POWER", ior, graph.math("MULTIPLY_ADD", back, -2.0, 1.0))
     inputs = {"IOR": turned} | ({"Normal": normal} if normal is not None else {})

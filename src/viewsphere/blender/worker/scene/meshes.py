@@ -1,4 +1,4 @@
-"""Meshes and their pictures from arrays; triangles stay in the arrays' order.
+"""Meshes and their pictures from arrays; triangles keep the arrays' order.
 
 glTF's v points down, Blender's up: v is flipped here and nowhere else, and Blender stores a picture's last row first. Layer
 names: `uv0`, `uv1`, `colors`.
@@ -17,13 +17,15 @@ COLORS = "colors"
 
 @dataclass(frozen=True)
 class Images:
-    """A mesh's pictures as Blender images, made at the first request: each file at most once as colour and once as data."""
+    """A mesh's pictures as Blender images, made at the first request. Each file becomes at most one colour and one data
+    image.
+    """
 
     told: list
     made: dict
 
     def get(self, index, is_color):
-        """The picture as sRGB colours or as plain numbers; colours under an alpha of 0 are kept."""
+        """The picture as sRGB colours or as plain numbers; colours with an alpha of 0 are kept."""
         told = self.told[index]
         key = told["pixels"], is_color
         if key not in self.made:

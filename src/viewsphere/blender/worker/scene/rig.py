@@ -1,8 +1,9 @@
 """The camera on the viewing sphere: a frame of the timeline for every pose.
 
-An empty, `target`, stands where the camera looks. Its child `viewing sphere`, which no render shows, has the camera's distance
-as its radius, and is rotated by 90 degrees less the elevation about X and by the azimuth about Z. The sphere's child is the
-camera, rolled by the tilt: rotating or scaling the sphere moves the camera. Keys are constant: poses are not interpolated.
+An empty, `target`, is at the point where the camera looks. Its child `viewing sphere` is not rendered. The sphere's radius
+is the camera's distance; it is rotated by 90 degrees less the elevation about X and by the azimuth about Z. The sphere's
+child is the camera, rolled by the tilt: rotating or scaling the sphere moves the camera. Keys are constant: poses are not
+interpolated.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ from ..files.playing import curves
 from ..rendering.frames import place_camera
 
 STILL = 1e-9
-"""Properties that change by less are not keyed: metres, radians, millimetres or shares of the picture."""
+"""Largest change of a property that gets no keys: metres, radians, millimetres or shares of the picture."""
 
 RINGS, SIDES = 12, 48
 """Circles of the displayed sphere, and edges of each circle."""
@@ -26,7 +27,7 @@ RINGS, SIDES = 12, 48
 def make_rig(scene, poses):
     """Target, sphere and the scene's camera, and a marker for each of the poses.
 
-    Returns the camera's largest error over all poses: in the scene's units; directions are compared at the distance of the
+    Returns the camera's largest error over all poses, in the scene's units; directions are compared at the distance of the
     target.
     """
     scene.frame_start, scene.frame_end = 1, len(poses)
@@ -89,8 +90,8 @@ def _off(scene, number, pose):
 
 
 def _ball():
-    """Circles of equal elevation and of equal azimuth, of radius 1, as edges; its poles lie on Y, which points up
-    in the picture of a camera without tilt.
+    """Circles of equal elevation and of equal azimuth, of radius 1, as edges. Their poles are on Y, which points up in the
+    picture of a camera without tilt.
     """
     angles = [2 * math.pi * i / SIDES for i in range(SIDES)]
     circles = []

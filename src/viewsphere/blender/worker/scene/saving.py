@@ -16,10 +16,10 @@ CURVES = {"standard": "Standard", "raw": "Standard", "filmic": "Filmic", "agx": 
 """Blender's view transform for each of viewsphere's."""
 
 LOOKS = {"Filmic": "Very High Contrast"}
-"""Blender's look that brings a transform nearest to viewsphere's; with a look, no background can be shown unchanged."""
+"""Blender's look that is nearest to each of viewsphere's transforms; with a look, no background can be shown unchanged."""
 
 SHOWN_AS = {"Standard": "sRGB", "Filmic": "Filmic sRGB", "AgX": "AgX Base sRGB"}
-"""For each view transform the colour space that a background's file must be given to be shown unchanged."""
+"""The colour space of a background's file for each view transform, so that the background is shown unchanged."""
 
 MODELS, SCENERY, LIGHTS, RIG = "models", "scenery", "lights", "rig"
 
@@ -69,7 +69,9 @@ def _show(scene, told):
 
 
 def _lay_behind(scene, told, space):
-    """Add compositor nodes that put the picture over a background; exposure and view transform do not change the background."""
+    """Add compositor nodes that put the picture over a background; exposure and view transform leave the background
+    unchanged.
+    """
     tree, out = _compositor(scene)
     behind, render = tree.nodes.new("CompositorNodeImage"), tree.nodes.new("CompositorNodeRLayers")
     dim, over = tree.nodes.new("CompositorNodeExposure"), tree.nodes.new("CompositorNodeAlphaOver")
@@ -144,7 +146,7 @@ def _pack_one(one, is_packed):
 
 
 def _pack(sequence):
-    """Pack all pictures into the file, except the backgrounds' sequence beside it; no path leads to any other folder."""
+    """Pack all pictures into the file, except the backgrounds' sequence beside it; no path leads to another folder."""
     for image in bpy.data.images:
         if image.source == "SEQUENCE" and sequence:
             image.filepath = f"//{sequence}/{Path(image.filepath).name}"

@@ -23,11 +23,11 @@ finds objects that follow the camera.
 
 
 def run(scene, told):
-    """Call the script's `shade(scene, objects, shot)` with the scene, and dicts of facts about viewsphere's objects and about
-    the shot.
+    """Call the script's `shade(scene, objects, shot)` with the scene, and dicts of facts about viewsphere's objects and
+    about the shot.
 
-    Raises ValueError with the script's line if the script fails or exits, or if it changes the meshes that a camera sees or
-    their visibility, because labels would miss such changes.
+    Raises ValueError with the script's line if the script fails or exits, or changes the meshes that a camera sees or their
+    visibility: labels would miss such changes.
     """
     placed = {one[ORDER]: one for one in scene.objects if ORDER in one}
     objects = {placed[order]: known for order, known in enumerate(told["things"])}
@@ -53,13 +53,13 @@ def run(scene, told):
 
 
 class _Standing:
-    """The facts on which labels depend. For every instance of a mesh that a render shows, these are its place, its shape and
-    its visibility to a camera. The camera's own settings belong to them, too.
+    """The facts on which labels depend: for every rendered instance of a mesh its place, its shape and its visibility to a
+    camera, and the camera's own settings.
     """
 
     @classmethod
     def from_scene(cls, scene):
-        """Return the state of the scene now, as a render would show it whose camera is at `ELSEWHERE`."""
+        """Return the current state of the scene, as a render with a camera at `ELSEWHERE` would show it."""
         made, resting = cls(scene), scene.camera.matrix_world.copy()
         scene.camera.matrix_world = ELSEWHERE
         evaluate(scene, made)
@@ -87,7 +87,7 @@ class _Standing:
             self._known[key] = shape, tuple(map(tuple, instance.matrix_world)), *_seen(item.original, depsgraph.view_layer)
 
     def difference(self, after):
-        """The first difference in words, None if there is none."""
+        """The first difference in words; None if there is none."""
         for key in {**self._known, **after._known}:
             if key not in after._known:
                 return f"{self._names[key]!r} gone"
@@ -106,7 +106,7 @@ def _seen(one, layer):
 
 
 def _shape(item, known):
-    """A digest of an evaluated object's triangles, None without vertices; of meshes that are placed more than once, once."""
+    """A digest of an evaluated object's triangles, None without vertices. `known` caches the digests of shared meshes."""
     if item.type == "META":
         try:
             return _digest(item.to_mesh())

@@ -1,5 +1,5 @@
-"""Makes a user's scene fit to be saved elsewhere as what it shows at the staged moment: without libraries, without animation,
-each rendered object with the number that instance maps have for it.
+"""Prepares a user's scene to be saved elsewhere as it is at the staged moment: without libraries and animation, and with
+each rendered object's number in instance maps.
 """
 
 from __future__ import annotations
@@ -21,11 +21,11 @@ KEPT = (
     "is_holdout",
     "color",
 )
-"""Properties of an object that show in pictures."""
+"""Properties of an object that affect pictures."""
 
 
 def settle(scene, members):
-    """Prepare the open scene; `members` are the numbers of labelled objects by name, and those of their instances."""
+    """Prepare the open scene; `members` are the numbers of labelled objects by name, and of their instances."""
     _take_over(scene)
     _hold_still()
     _number(scene, members)
@@ -48,7 +48,7 @@ def _number(scene, members):
 
 
 def _take_over(scene):
-    """Make all linked library data local: a saved number or path would otherwise belong to the library and be lost."""
+    """Make all linked library data local. Otherwise a saved number or path would belong to the library and be lost."""
     if not bpy.data.libraries:
         return
     before = set(scene.objects)
@@ -68,7 +68,7 @@ def _kinds():
 
 
 def _hold_still():
-    """Switch off a user's animation, which keeps its values of the staged moment: frames of the timeline are poses now."""
+    """Switch off a user's animation, which keeps the values of the staged moment: frames of the timeline become poses."""
     for kind in _kinds():
         for one in kind:
             for animated in (one, getattr(one, "node_tree", None)):
@@ -80,9 +80,8 @@ def _hold_still():
 
 
 class _Numbering:
-    """The objects that a render shows, with the number of each one's owner. An object that is instanced for several owners of
-    different numbers cannot have all of these: its owners' instances become objects. So do particles that are born with
-    time.
+    """The objects that a render shows, with the numbers of their owners. An object can have only one number: if owners with
+    different numbers instance it, their instances become objects. So do particles that depend on time.
     """
 
     def __init__(self, members):
@@ -112,7 +111,7 @@ class _Numbering:
         self._owners = list(apart)
 
     def _shown(self, depsgraph):
-        """Owner, object and instance of everything that is shown, except viewsphere's own objects."""
+        """Owner, object and instance of everything that is rendered, except viewsphere's own objects."""
         for instance in depsgraph.object_instances:
             owner = instance.parent if instance.is_instance else instance.object
             if instance.show_self and not is_placed(owner):
@@ -122,7 +121,7 @@ class _Numbering:
         return self._members.get(owner.name, 0)
 
     def apply(self, scene):
-        """Give the objects their numbers, and put the instances of those that clash into the scene."""
+        """Give the objects their numbers, and turn clashing instances into objects of the scene."""
         for one in bpy.data.objects:
             if not is_placed(one):
                 one.pass_index = self._numbers.get(one, 0)
@@ -140,7 +139,7 @@ def _is_born(owner):
 
 
 def _solid(item, mesh):
-    """A new object that shows this mesh as the item would."""
+    """A new object that shows this mesh as the item does."""
     made = bpy.data.objects.new(item.name, mesh)
     for name in KEPT:
         setattr(made, name, getattr(item, name))

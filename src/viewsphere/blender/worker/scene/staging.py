@@ -14,8 +14,8 @@ from ..rendering.blurring import ORDER
 from . import ground, lights, materials, meshes, scripting
 
 DARKEST = 0.6
-"""Largest share of the light that shadows remove: Workbench darkens faces turned away from the sun as much, though the sun
-gives them nothing.
+"""Largest share of the light that shadows remove. Workbench darkens faces turned away from the sun equally, although the sun
+does not light them.
 """
 
 TURNED = 0.05
@@ -27,7 +27,7 @@ NUMBER = "number"
 
 
 def stage(told):
-    """Replace the open scene by the one in `told`, which has no camera: each render brings its own."""
+    """Replace the open scene by the scene in `told`, which has no camera: each render brings its own."""
     if told["file"]:
         scene = open_scene(told["file"])
     else:
@@ -58,7 +58,7 @@ def stage(told):
 
 
 def paint(told):
-    """Rebuild the materials of some models, whose pictures have become coarser or finer; the scene is otherwise kept."""
+    """Rebuild the materials of some models, whose pictures have become coarser or finer; the rest of the scene is kept."""
     numbered = {mesh[NUMBER]: mesh for mesh in bpy.data.meshes if NUMBER in mesh}
     made = {}
     before = set(bpy.data.images)
@@ -91,7 +91,7 @@ def _mesh(name, told, known, renderer):
 
 
 def is_placed(one):
-    """Return whether an object is viewsphere's own, not one of a user's file."""
+    """Return whether an object is viewsphere's own, not part of a user's file."""
     return ORDER in one
 
 
@@ -104,8 +104,8 @@ def _place(scene, mesh, matrix, index):
 
 
 def _studio_light(display, lights, hemispheres):
-    """Light the display's studio by the sun among the `lights`, and by `hemispheres` (2, 3), the radiance of a white matt
-    surface that faces up, and of one that faces down; None leaves Blender's own studio as it is.
+    """Light the display's studio by the sun among the `lights`, and by `hemispheres` (2, 3): the radiance of a white matt
+    surface that faces up, and of one that faces down. None leaves Blender's own studio unchanged.
     """
     if hemispheres is None:
         return
@@ -138,6 +138,6 @@ def _shine(lamp, toward, color, smooth):
 
 
 def _turned(direction):
-    """A direction of the world in a studio's axes."""
+    """A world direction in the axes of a studio."""
     x, y, z = direction
     return x, z, -y

@@ -15,7 +15,7 @@ _EXTENSIONS = {"repeat": "REPEAT", "clamp": "EXTEND", "mirror": "MIRROR"}
 
 @dataclass(frozen=True)
 class Textures:
-    """The textures of one material; each texture is looked up by one node, however many of its channels are used."""
+    """The textures of one material; one node looks up each texture, for any number of its channels."""
 
     graph: Graph
     images: Images
@@ -85,7 +85,7 @@ class Textures:
         )
 
     def _transformed(self, told, place):
-        """KHR_texture_transform where v points up: the same scale and rotation, but about the picture's other corner."""
+        """KHR_texture_transform with v pointing up: the same scale and rotation, but about the picture's other corner."""
         (_, b), (_, d) = _matrix(told)
         x, y = told["offset"]
         inputs = {
@@ -99,8 +99,8 @@ class Textures:
     def _wrapped(self, place, wraps, size):
         """Wrap the axes whose entry of `wraps` is not None by nodes; the image node's own mode wraps the other axis.
 
-        Coordinates stay half a texel inside of the edge, where a look-up does not blend with the opposite edge; mirrored or
-        clamped look-ups beyond would see that same texel anyway.
+        Coordinates stay half a texel inside the edge, where a look-up does not blend with the opposite edge. Mirrored or
+        clamped look-ups beyond the edge have the same texel.
         """
         split = self.graph.node("ShaderNodeSeparateXYZ", {0: place}).outputs
         axes = [self._wrapped_axis(split[k], wraps[k], 0.5 / size[k]) for k in range(2)]
@@ -126,7 +126,7 @@ def _matrix(told):
 
 
 def _turn(told):
-    """Rows (2, 2) that take a normal map's x and y to the mesh's u and to up in the picture, as orthogonal directions."""
+    """Rows (2, 2) that convert a normal map's x and y to the mesh's u and to up in the picture, as orthogonal directions."""
     (a, b), (c, d) = _matrix(told)
     turning = a * d - b * c
     if turning == 0:
