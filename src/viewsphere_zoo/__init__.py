@@ -195,15 +195,15 @@ def _own_folder(_process: int) -> Path:
 
 
 def _digest(name: str) -> str:
-    """Of the sources that a family's file is made by, and of what else it is made of."""
+    """Digest of the sources and the data from which a family's file is made."""
     made_of = family(name).made_of
     return hashlib.sha256(f"{_sources()} {made_of() if made_of else ''}".encode()).hexdigest()[:20]
 
 
 @cache
 def _sources() -> str:
-    """Digest of all sources that models of the zoo are made by, and of what their numbers depend on: the processor's type and
-    the kernels' build.
+    """Digest of all sources of the zoo's models, and of everything that changes their numbers: the processor's type and the
+    kernels' build.
     """
     from viewsphere import geometry
     from viewsphere.assets.cache import readers_digest

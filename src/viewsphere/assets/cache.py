@@ -176,7 +176,7 @@ def in_file(spec: ModelSpec, file: Path) -> ModelSpec:
 
 
 def _built(spec: ModelSpec, named: Named) -> Mesh | Path:
-    """The mesh or file that a source supplies; raises PluginError where it supplies something else."""
+    """The mesh or file that a source supplies; raises PluginError if it supplies something else."""
     try:
         return checked(SourceSpec, named.prefix, "load", named.spec.load(spec), Mesh, Path)
     except OSError as error:

@@ -89,7 +89,7 @@ def _tell(held: dict[str, Any]) -> None:
 
 
 def _bytes(text: str) -> int:
-    """The number of bytes in a text; raises UserError where there is none."""
+    """The number of bytes in a text; raises UserError if there is none."""
     from viewsphere.limits import parsed
 
     try:

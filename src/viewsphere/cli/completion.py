@@ -28,7 +28,7 @@ def models(incomplete: str) -> list[str]:
 
 
 def _names(entry: EntryPoint) -> list[str]:
-    """The names that a source's entry point lists; none where it cannot: a traceback in the middle of a line helps nobody."""
+    """The names that a source's entry point lists; none if it cannot be loaded: a traceback would spoil the command line."""
     try:
         return list(entry.load()())
     except Exception:

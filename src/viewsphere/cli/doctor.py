@@ -122,8 +122,8 @@ def _kernels() -> dict[str, Any]:
 
 
 def _speed() -> dict[str, Any] | None:
-    """CPU milliseconds of a frame, beside the machine of docs/performance.md; None where kernels are not compiled yet, or
-    where the model is lacking.
+    """CPU milliseconds of a frame, beside the machine of docs/performance.md; None if kernels are not compiled yet, or if
+    the model is lacking.
     """
     from viewsphere.run.estimate import REFERENCE_MS, measure_speed
 

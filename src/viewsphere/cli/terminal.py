@@ -39,7 +39,7 @@ CLOSED = 141
 
 
 def say(line: str, *, err: bool = False) -> None:
-    """Print a line, its control characters escaped; the only way in which commands print.
+    """Print a line, its control characters escaped; all commands print through it.
 
     Raises UserError if the output accepts no more, as on a full disk; ends quietly if its reader has ended.
     """
@@ -251,7 +251,7 @@ def _say_target() -> None:
 
 
 KERNELS_S = 1.5
-"""Seconds between lines about kernels where no bar can be drawn."""
+"""Seconds between lines about kernels if no bar can be drawn."""
 
 
 @contextmanager

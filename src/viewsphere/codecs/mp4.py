@@ -159,7 +159,7 @@ def _fed(pipe: IO[bytes], parts: Iterator[bytes]) -> bool:
 
 
 def _end(code: int | None, said: IO[bytes]) -> str:
-    """Return the way in which ffmpeg ended, and its first message, which names the cause.
+    """Return how ffmpeg ended, and its first message, which names the cause.
 
     code: the exit code, None if ffmpeg has not ended.
     """

@@ -56,8 +56,8 @@ def _by_pillow(array: Picture, kind: str, **options: Any) -> bytes:
 def decode_picture(data: bytes, components: int) -> Picture:
     """The picture in a file of any kind, (H, W, components) with 3 or 4 of them.
 
-    Raises OSError, ValueError or SyntaxError for a damaged file, UserError for one beyond MAX_STORED_PIXELS, MissingExtraError
-    where its codec is not installed.
+    Raises OSError, ValueError or SyntaxError for a damaged file, UserError for one beyond MAX_STORED_PIXELS,
+    MissingExtraError if its codec is not installed.
     """
     from PIL import Image
 

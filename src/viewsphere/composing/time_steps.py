@@ -329,7 +329,7 @@ def _runs_of(timing: Timing | None, views: Poses) -> tuple[Run, ...]:
 
 
 def check_keys(keys: Iterable[tuple[str, ModelSpec]]) -> None:
-    """Raise RecipeError where a time step of one model has the key of another model; `keys` are all, with their models."""
+    """Raise RecipeError if a time step of one model has the key of another model; `keys` are all, with their models."""
     seen: dict[str, ModelSpec] = {}
     for key, spec in keys:
         if seen.setdefault(key.casefold(), spec).key != spec.key:

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Scope:
-    """The known facts about a data set before any of it is rendered. `rig` is the rig of its first part, None where it is
+    """The known facts about a data set before any of it is rendered. `rig` is the rig of its first part, None if it is
     unknown, as for imported pictures. `is_moving`: its pictures are of sequences. `most_objects` is the largest number of
     objects in a picture. `channels` and `annotations` are the labels and passes that it keeps, and the labels that can be
     computed from its shots. `pictures` are a few pictures of each part, one for each different set of known facts. They are

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 def compute(context: LabelContext, i: int) -> Mapping[str, Any]:
-    """Half-open pixel corners, None where no pixel shows the object."""
+    """Half-open pixel corners, None if no pixel shows the object."""
     seen = context.instances
     return {"box2d": tuple(map(float, seen.box[i + 1].tolist())) if seen.area[i + 1] else None}
 

@@ -118,7 +118,7 @@ class Scene:
         return found
 
     def extreme(self, name: str, sort: Truths) -> int | None:
-        """The number of the object that is the leftmost, ... of those of a sort; None if no object clearly is."""
+        """The number of the object of a sort that is the leftmost, ...; None if no object clearly is."""
         at = np.flatnonzero(sort)
         if name in ("leftmost", "rightmost"):
             sign = 1.0 if name == "leftmost" else -1.0

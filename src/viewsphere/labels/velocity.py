@@ -52,7 +52,7 @@ def compute(context: LabelContext, i: int) -> Mapping[str, Any]:
 
 
 def keep(o: ObjectAnnotation) -> Any:
-    """Return the three fields; None where they are unknown."""
+    """Return the three fields; None if they are unknown."""
     kept = [None if getattr(o, name) is None else getattr(o, name).tolist() for name in FIELDS]
     return kept if any(kept) else None
 

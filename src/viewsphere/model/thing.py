@@ -41,9 +41,9 @@ class TimeStep(Frozen):
 class Motion(Frozen):
     """The pose of a thing, and the time step of its file that it shows.
 
-    `poses` has one rigid pose (world from object) for all instants of a shot, or one an instant, None where the thing is not
-    there. `steps` has one time step for all instants, or one an instant, None for a model at rest. A thing of a sequence with
-    `moves` does not count as still, even if it rests during a shot.
+    `poses` has one rigid pose (world from object) for all instants of a shot, or one an instant, None if the thing is not
+    there. `steps` has one time step for all instants, or one an instant, None for a model at rest. A thing of a sequence
+    with `moves` does not count as still, even if it rests during a shot.
     """
 
     poses: tuple[Matrix4 | None, ...] = Field(default=(IDENTITY,), min_length=1)

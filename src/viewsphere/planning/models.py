@@ -138,7 +138,7 @@ def _shown(folder: Path, where: str) -> list[Path]:
 def _check_file(entry: ModelEntry, found: _Found) -> None:
     """Check, by its name alone, that a file can be read with the entry's settings.
 
-    Raises RecipeError for a kind of file that is not read and a forward along the file's up axis, MissingExtraError where
+    Raises RecipeError for a kind of file that is not read and a forward along the file's up axis, MissingExtraError if
     Blender reads such files and is not installed.
     """
     where, path = f"models[{found.entry}]", Path(found.source)
@@ -225,7 +225,7 @@ def _scale(recipe: Recipe, entry: ModelEntry, key: str) -> Literal["as_is", "rea
 
 
 def _sidecar(recipe: Recipe, index: int) -> str | None:
-    """The path of the sidecar that an entry names; raises RecipeError where there is no such file."""
+    """The path of the sidecar that an entry names; raises RecipeError if there is no such file."""
     name = recipe.models[index].sidecar
     if name is None:
         return None
@@ -273,7 +273,7 @@ def _free(key: str) -> str:
 
 
 def _short(key: str) -> str:
-    """The key, or its beginning and a digest of all of it where file systems would find it too long (255 bytes)."""
+    """The key, or its beginning and a digest of the whole key if it is too long for file systems (255 bytes)."""
     data = key.encode()
     if len(data) <= LONGEST_KEY:
         return key
@@ -315,7 +315,7 @@ def _matching(folder: Path, source: str, where: str) -> list[Path]:
 
 
 def _normal(path: Path) -> Path:
-    """Return the path without `..`; the same object where it has none, as most of many thousands have not."""
+    """Return the path without `..`; the same object if it has none, as most of many thousands."""
     return Path(os.path.normpath(path)) if ".." in path.parts else path
 
 
@@ -374,7 +374,7 @@ def _is_hidden(name: str) -> bool:
 
 
 def _with_unique_keys(found: list[_Found]) -> list[_Found]:
-    """Files of one name get their ending or their folders' names behind it; raises RecipeError where that is no help."""
+    """Files of one name get their ending or their folders' names behind it; raises RecipeError if that is no help."""
     groups: defaultdict[str, list[_Found]] = defaultdict(list)
     for item in found:
         groups[item.key.casefold()].append(item)

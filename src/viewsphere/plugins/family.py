@@ -1,4 +1,4 @@
-"""The spec of a family of models: how one is drawn and built, and what is known of all of them."""
+"""The spec of a family of models: how a model is drawn and built, and the facts common to all models."""
 
 from __future__ import annotations
 

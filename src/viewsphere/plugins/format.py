@@ -13,7 +13,7 @@ from viewsphere.plugins.spec import SpecWithOptions
 from viewsphere.validation.specs import Takes
 
 Remark = tuple[int | None, str]
-"""A fault of an export: the number of its frame in the plan (None: of the whole export), and what is wrong."""
+"""A fault of an export: the number of its frame in the plan (None: of the whole export), and the error."""
 
 
 class FormatSpec(SpecWithOptions):

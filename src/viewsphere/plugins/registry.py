@@ -1,9 +1,9 @@
 """Finds plug-ins by name, and loads them.
 
-A plug-in is one module that holds a spec, such as `FORMAT = FormatSpec(...)`. A module's name is the plug-in's name, so listing
-names imports no plug-in. Other packages name their modules in entry points of the groups `viewsphere.formats` and so on, or a
-package with a module a plug-in in the group `viewsphere.packages`: `families = "my_package.families"`. A plug-in of theirs that
-cannot be loaded is an error for those that name it, and for nothing else.
+A plug-in is one module that holds a spec, such as `FORMAT = FormatSpec(...)`. A module's name is the plug-in's name, so
+listing names imports no plug-in. Other packages name their modules in entry points of the groups `viewsphere.formats` and so
+on, or a package with a module a plug-in in the group `viewsphere.packages`: `families = "my_package.families"`. A plug-in of
+theirs that cannot be loaded is an error only if a recipe names it.
 
 A module of labels may hold several, as `LABELS = (ChannelLabel(name="flow", ...), ...)`. Listing reads their names in the text
 of that statement, without importing the module. Loading compares them with the labels. Third parties write one entry point for
@@ -141,7 +141,7 @@ def origin(kind: Kind, name: str) -> str:
 
 
 def module_file(kind: Kind, name: str) -> Path | None:
-    """The file of a plug-in's module; None where it has none."""
+    """The file of a plug-in's module; None if it has none."""
     found = importlib.util.find_spec(_found(kind)[name].module)
     return None if found is None or found.origin is None else Path(found.origin)
 
@@ -239,7 +239,7 @@ def _imported(found: _Found, name: str) -> Any:
 
 
 def _spec(spec: type[S], found: Any, name: str) -> S:
-    """The spec in a plug-in's module; raises PluginError where there is none."""
+    """The spec in a plug-in's module; raises PluginError if there is none."""
     from viewsphere.validation.errors import nearest, shown
 
     if isinstance(found, spec):
@@ -261,7 +261,7 @@ def _spec(spec: type[S], found: Any, name: str) -> S:
 
 
 def _one_of_several(spec: type[S], where: str, held: Any, module: str, name: str) -> S:
-    """The spec of this name among those of a module; raises PluginError where listing does not name all of them."""
+    """The spec of this name among those of a module; raises PluginError if listing does not name all of them."""
     from viewsphere.validation.errors import shown
 
     for i, each in enumerate(held if isinstance(held, tuple) else (held,)):

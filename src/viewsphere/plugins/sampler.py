@@ -1,4 +1,4 @@
-"""The spec of a sampler: which shots a recipe means, and what is in each."""
+"""The spec of a sampler: the shots of a recipe, and their contents."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from viewsphere.plugins.registry import Kind
 from viewsphere.plugins.spec import SpecWithOptions
 
 Recipe = Any
-"""`viewsphere.recipe.recipe.Recipe`: what a plug-in gets from higher layers has no type here."""
+"""`viewsphere.recipe.recipe.Recipe`: values from higher layers have no type here."""
 
 SamplingContext = Any
 """`viewsphere.planning.samplers.SamplingContext`."""

@@ -1,4 +1,4 @@
-"""The spec of a source of models and places: what follows its prefix in a recipe, as in `zoo:car`."""
+"""The spec of a source of models and places: the names after its prefix in a recipe, as in `zoo:car`."""
 
 from __future__ import annotations
 
@@ -112,7 +112,7 @@ def place_names() -> tuple[str, ...]:
 
 
 def with_roads() -> str:
-    """The places of all sources that have roads, in words, for messages; `a file` where there are none. A place that cannot be
+    """The places of all sources that have roads, in words, for messages; `a file` if there are none. A place that cannot be
     loaded is left out: the message is about another mistake.
     """
     places = ((name, _asked(prefix_of(name), None, place_of, name)) for name in place_names())
@@ -131,8 +131,8 @@ def families_named(name: str) -> Iterator[ZooFamily]:
 
 
 def _asked(prefix: str, otherwise: Any, ask: Callable[..., Any], *about: str) -> Any:
-    """What a source answers about everything it has; `otherwise` where a plug-in of a third party fails, as that is an error
-    only for those that name it.
+    """What a source answers about everything it has; `otherwise` where a plug-in of a third party fails, because the error
+    concerns only recipes that name it.
     """
     try:
         return ask(*about)
@@ -160,7 +160,7 @@ def sources() -> Mapping[str, SourceSpec]:
 
 
 def model_for(role: Role, otherwise: str | None = None) -> str:
-    """The source of the model that viewsphere itself uses, such as `zoo:car`, shipped sources first; raises UserError where no
+    """The source of the model that viewsphere itself uses, such as `zoo:car`, shipped sources first; raises UserError if no
     source has one, unless another text is given.
     """
     for prefix, spec in sources().items():

@@ -1,4 +1,4 @@
-"""The base of all specs: what a plug-in states about itself, checked when it is loaded."""
+"""The base of all specs: the facts about a plug-in, checked when it is loaded."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar, Self
@@ -32,7 +32,7 @@ class Spec(Frozen):
         return made
 
     def with_fields_of(self, field: str, names: Sequence[str]) -> Self:
-        """Return the spec; raises PluginError where the class in a field lacks fields of these names."""
+        """Return the spec; raises PluginError if the class in a field lacks fields of these names."""
         lacking = [name for name in names if name not in getattr(self, field).model_fields]
         if lacking:
             expected = f"expected a class with the fields {', '.join(names)}"
@@ -56,7 +56,7 @@ class SpecWithOptions(Spec):
         return self.options is not None
 
     def read_options(self, name: str, given: Mapping[str, Any], field: str) -> tuple[Frozen, ...]:
-        """The options as the plug-in's class reads them, or nothing where it has none.
+        """The options as the plug-in's class reads them, or nothing if it has none.
 
         Raises RecipeError for options that are not valid, as mistakes of the recipe's field.
         """

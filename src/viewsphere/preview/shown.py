@@ -126,7 +126,7 @@ def dataset_samples(dataset: Dataset, count: int = 12, row: int = ROW, films: Se
 
 def _spread(planned: Plan, count: int) -> list[tuple[str, list[list[int]]]]:
     """Subjects and their poses, those of one time step together, such that subjects follow in order and poses step through
-    the grid; all where there are so few.
+    the grid; all if there are no more.
     """
     subjects, taken = planned.taken, planned.rows.taken
     if count >= planned.frames:

@@ -50,8 +50,8 @@ def write_video(
     """Write all sequences of samples (or the one named) one after another, their sensors side by side, at their own frame
     rates, with the labels named in `draw`, as MP4 or animated WebP, by the file's suffix.
 
-    Raises StoreError for samples without sequences, unknown names and labels that are not there, UserError for other endings,
-    for more pictures than a WebP may hold and where ffmpeg fails, MissingExtraError where ffmpeg is not installed.
+    Raises StoreError for samples without sequences, unknown names and labels that are not there, UserError for other
+    endings, for more pictures than a WebP may hold and where ffmpeg fails, MissingExtraError if ffmpeg is not installed.
     """
     write = _writer(file)
     films = films_of(samples, is_shown)

@@ -1,8 +1,8 @@
 """The frozen names that seed the draws of a recipe's fields.
 
-The draw of a field is seeded by the names on its path, for example `sun` and `azimuth_deg`. These names are constants: you may
-rename a field, a class or a module, but its draws, and so its pictures, stay what they were. To rename a field, move
-its name from `_UNCHANGED` to `_RENAMED`, with the old name on the right.
+The draw of a field is seeded by the names on its path, for example `sun` and `azimuth_deg`. These names are constants: you
+may rename a field, a class or a module, but its draws, and so its pictures, do not change. To rename a field, move its name
+from `_UNCHANGED` to `_RENAMED`, with the old name on the right.
 """
 
 from __future__ import annotations

@@ -73,10 +73,10 @@ def write_report(
 ) -> int:
     """Write the page of a data set, finished or half finished; returns its size in bytes, at most `LIMIT`.
 
-    All frames are counted (by `workers` processes; 0: in this process; more need a `__main__` guard in the calling script), and
-    `frames` of them are shown, the same frames every time. `listener` is called with phase, done and total. Raises StoreError
-    where no frame is finished or a record or picture cannot be read, UserError where the page would be too large or cannot be
-    written.
+    All frames are counted (by `workers` processes; 0: in this process; more need a `__main__` guard in the calling script),
+    and `frames` of them are shown, the same frames every time. `listener` is called with phase, done and total. Raises
+    StoreError if no frame is finished or a record or picture cannot be read, UserError if the page would be too large or
+    cannot be written.
     """
     tell = listener or _unheard
     if not len(dataset):

@@ -36,8 +36,8 @@ def served_page(title: str, data: Mapping[str, Any], own: Path, vendor: str) -> 
     """The complete HTML text of a page that loads more data from its server.
 
     `own` is a folder with a style and modules of that page: they are called `own/<file>`, and its `main.js` starts the page.
-    The libraries are the module `own/vendor.js`, which is loaded from the path `vendor` when it is needed. No script runs but
-    those of this text and what they import.
+    The libraries are the module `own/vendor.js`, which is loaded from the path `vendor` when it is needed. Only the scripts
+    of this text run, and the modules that they import.
     """
     nonce = secrets.token_urlsafe(16)
     modules = {**_modules(WEB, "report"), **_modules(own, "own"), "own/vendor.js": vendor}

@@ -53,8 +53,8 @@ def check_skies(work: Missing, tell: Listener) -> tuple[str, ...]:
 def render_part(
     work: Missing, pool: WorkerPool, keep_going: bool, tell: Listener, pulse: HeartbeatWriter
 ) -> tuple[int, dict[str, str]]:
-    """Make the part's models, add the part to the data set and render its shots; returns the frames made and what was left
-    out.
+    """Make the part's models, add the part to the data set and render its shots; returns the rendered frames, and the left
+    out models and shots.
     """
     portion, store = work.portion, work.store
     if portion.number:
@@ -164,7 +164,7 @@ def _accept(outcome: Outcome, keep_going: bool, skipped: dict[str, str]) -> None
 
 
 def _note_skipped(portion: DatasetPart, store: Store, skipped: dict[str, str]) -> None:
-    """Store what was left out, together with that of other parts and shards."""
+    """Store the left out models and shots, together with those of other parts and shards."""
     own = {spec.key for spec, _ in portion.models} | set(portion.subjects)
     with store.locked():
         others = {key: why for key, why in store.skipped().items() if key not in own and portion.find(key) is None}

@@ -29,7 +29,7 @@ class Made:
 def make_again(kind: str, source: Path, folder: Path) -> Made:
     """Make a folder with a recipe that renders a data set again.
 
-    The folder appears when all of it is there and its recipe has been planned. Raises UserError for a format that cannot be
+    The folder appears when it is complete and its recipe has been planned. Raises UserError for a format that cannot be
     rendered again and for a folder that holds something, StoreError for a data set that is broken.
     """
     known = _again()

@@ -102,7 +102,7 @@ def _entry(model: SourceModel, source: str, sidecar: str | None) -> dict[str, An
 
 
 def _joined(entries: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
-    """Entries with those that differ only in their files joined into one."""
+    """The entries; entries that differ only in their files are joined."""
     found: dict[str, dict[str, Any]] = {}
     for entry in entries:
         rest = json.dumps({name: value for name, value in entry.items() if name != "source"})

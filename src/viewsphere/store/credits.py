@@ -57,7 +57,7 @@ def escaped(text: str) -> str:
 
 
 def credits_digest(models: Iterable[ModelInfo]) -> str | None:
-    """Digest of the file's text (xxh128, hexadecimal); None where no credit is known."""
+    """Digest of the file's text (xxh128, hexadecimal); None if no credit is known."""
     text = credits_text(models)
     return xxhash.xxh3_128(text.encode()).hexdigest() if text else None
 

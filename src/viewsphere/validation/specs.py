@@ -39,7 +39,9 @@ def check_calls(spec: BaseModel, takes_options: bool = False) -> None:
 
 
 def _values(field: FieldInfo, takes_options: bool) -> int | None:
-    """The number of values that a field's function takes; None for what is no function, or one of any values."""
+    """The number of values that a field's function takes; None for values that are no functions, and for functions of any
+    number of values.
+    """
     for mark in field.metadata:
         if isinstance(mark, Takes):
             return mark.values + takes_options

@@ -314,7 +314,7 @@ class _Handler(BaseHTTPRequestHandler):
             self.rfile = stream
 
     def _head(self) -> bytes | None:
-        """The lines of the headers up to the empty one; None where they are too long."""
+        """The lines of the headers up to the empty one; None if they are too long."""
         head, line = b"", self.raw_requestline
         while line not in (b"\r\n", b"\n", b""):
             left = MOST_HEAD - len(self.raw_requestline) - len(head)

@@ -86,7 +86,7 @@ class Dining:
 
     @property
     def extent(self) -> tuple[float, float, float]:
-        """Width, depth and height of all of it, metres, at most."""
+        """Greatest width, depth and height of the whole model, metres."""
         return self.width + 0.07, self.depth + 0.19, self.height + 0.05
 
 

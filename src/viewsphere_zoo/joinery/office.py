@@ -59,7 +59,7 @@ class Office:
 
     @property
     def extent(self) -> tuple[float, float, float]:
-        """Width, depth and height of all of it, metres, at most."""
+        """Greatest width, depth and height of the whole model, metres."""
         return self.seat_width + 0.2, self.seat_depth + 0.23, self.height + 0.15
 
 

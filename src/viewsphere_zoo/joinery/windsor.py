@@ -42,7 +42,7 @@ class Windsor:
 
     @property
     def extent(self) -> tuple[float, float, float]:
-        """Width, depth and height of all of it, metres, at most."""
+        """Greatest width, depth and height of the whole model, metres."""
         return self.width + 0.03, self.depth + 0.15, self.height + 0.01
 
 
@@ -63,7 +63,7 @@ class Shell:
 
     @property
     def extent(self) -> tuple[float, float, float]:
-        """Width, depth and height of all of it, metres, at most."""
+        """Greatest width, depth and height of the whole model, metres."""
         return self.width + 0.03, self.depth + 0.11, self.height + 0.01
 
 

@@ -199,5 +199,5 @@ def _inside(text: str, record: PlanRecord) -> Iterator[str]:
 
 
 def _read(file: Path) -> Any:
-    """The value of a JSON file, None where there is no such file."""
+    """The value of a JSON file, None if there is no such file."""
     return parsed(read_bytes(file, "MAX_RECORD_BYTES")) if file.is_file() else None

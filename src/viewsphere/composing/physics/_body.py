@@ -102,7 +102,7 @@ def _volume(corners: Float, triangles: NDArray[np.int32]) -> float:
 
 
 def needed(package: str) -> Any:
-    """A package of the extra physics; raises MissingExtraError where it is not installed."""
+    """A package of the extra physics; raises MissingExtraError if it is not installed."""
     import importlib
 
     try:

@@ -18,7 +18,7 @@ from viewsphere.plugins.placer import PlacerSpec
 def place(
     cast: Sequence[ModelSpec], room: Room, shapes: Sequence[Shape], views: Sequence[Camera], rng: Draws
 ) -> Sequence[Matrix4]:
-    """Poses, the room's gap between neighbours' boxes; raises RecipeError where the row leaves the free floor."""
+    """Poses, the room's gap between neighbours' boxes; raises RecipeError if the row leaves the free floor."""
     poses: list[Matrix4] = []
     edges = [float(x) for shape, pose in room.taken for x in transform(np.array(pose), shape.box)[:, 0]]
     left, right = (min(edges), max(edges)) if edges else (math.inf, -math.inf)

@@ -43,7 +43,7 @@ class Options(Gaps):
 def place(
     cast: Sequence[ModelSpec], room: Room, shapes: Sequence[Shape], views: Sequence[Camera], rng: Draws, options: Options
 ) -> Sequence[Matrix4]:
-    """Poses, no two boxes, or hulls, nearer than the room's gap; raises RecipeError where no spot is found for one."""
+    """Poses, no two boxes, or hulls, nearer than the room's gap; raises RecipeError if no spot is found for one."""
     if room.free is None or room.taken:
         return scattered(cast, room, shapes, rng, options, free_spot)
     if options.reach is None:
@@ -69,7 +69,7 @@ def _roomy(free: Footprint, shapes: Sequence[Shape]) -> Footprint:
 
 
 def _within(floor: Footprint, reach: float) -> Footprint:
-    """The part of a floor within `reach` of the origin along its axes; all of it if the whole floor is farther away."""
+    """The part of a floor within `reach` of the origin along its axes; the whole floor if all of it is farther away."""
     middle = floor.axes @ floor.center
     low, high = np.maximum(middle - floor.half, -reach), np.minimum(middle + floor.half, reach)
     if (high <= low).any():

@@ -95,7 +95,7 @@ def place(
 
 
 def _roads(room: Room, shapes: Sequence[Shape], reach: float) -> _Roads:
-    """The part of the place that is used; raises RecipeError where it has no lanes, or none within reach."""
+    """The part of the place that is used; raises RecipeError if it has no lanes, or none within reach."""
     if not room.lanes:
         raise RecipeError(
             f"{room.field}.layout: traffic needs a scene.place with lanes, and this one has none. Use {with_roads()}, "

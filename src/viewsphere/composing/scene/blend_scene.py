@@ -108,7 +108,7 @@ class BlendScenery(Sendable):
         return tuple(Labelled(by_name[name], tuple(found), category[name] or "") for name, found in sorted(members.items()))
 
     def _category(self, one: SceneObject) -> str | None:
-        """Return the category of an object itself; None where no rule fits."""
+        """Return the category of an object itself; None if no rule fits."""
         for rule in self.entry.labels:
             if _fits(rule, one):
                 return str(one.properties[rule.property]) if rule.property and rule.category == VALUE else rule.category

@@ -122,8 +122,8 @@ def _with_motion(piece: SceneryPiece, motions: Mapping[str, Motions]) -> Scenery
 
 
 def place_lanes(recipe: Recipe, entry: PlaceEntry | None, names: Names) -> tuple[Lane, ...]:
-    """The lanes of a place where it stands, world axes; none where it has none. Raises RecipeError for a file's lane that
-    cannot be one.
+    """The lanes of a placed place, world axes; empty if it has none. Raises RecipeError for a file's lane that cannot be
+    one.
     """
     if entry is None:
         return ()
@@ -172,7 +172,7 @@ def _carried(lane: Lane, world_from_place: NDArray[np.float64]) -> Lane:
 
 
 def place_bays(recipe: Recipe, entry: PlaceEntry | None, names: Names) -> tuple[Bay, ...]:
-    """The parking bays of a place where it stands, in world axes; empty for places without."""
+    """The parking bays of a placed place, in world axes; empty for places without."""
     if entry is None:
         return ()
     world_from_place = _world_from_place(recipe, entry, names)
@@ -181,7 +181,7 @@ def place_bays(recipe: Recipe, entry: PlaceEntry | None, names: Names) -> tuple[
 
 
 def place_pavements(recipe: Recipe, entry: PlaceEntry | None, names: Names) -> tuple[Lane, ...]:
-    """The pavements of a place where it stands, in world axes; empty for places without."""
+    """The pavements of a placed place, in world axes; empty for places without."""
     if entry is None:
         return ()
     world_from_place = np.array(_world_from_place(recipe, entry, names))
@@ -280,7 +280,7 @@ def scenery_key(name: str, rest: str) -> str:
 
 
 def plane_images(recipe: Recipe) -> tuple[tuple[str, ...], ...]:
-    """Absolute paths of the pictures of each entry of planes, sorted; raises RecipeError where there are none."""
+    """Absolute paths of the pictures of each entry of planes, sorted; raises RecipeError if there are none."""
     found: list[tuple[str, ...]] = []
     for i, entry in enumerate(recipe.scene.planes):
         if entry.image is not None:
@@ -323,7 +323,7 @@ def plane_pieces(
 ) -> Iterator[SceneryPiece]:
     """The planes of one model, or of one frame, clear of the targets and of one another; `redraw` names another draw.
 
-    Raises RecipeError where that cannot be.
+    Raises RecipeError if that cannot be.
     """
     standing_there = list(targets)
     for i, entry in enumerate(recipe.scene.planes):

@@ -34,7 +34,7 @@ class SequencePoses(RepeatedPoses):
         return {**self.base.counts, "instants": self.instants}
 
     def taken(self, index: int) -> int:
-        """The number of the sequence's pose, which is the number of the sequence among those of its subject."""
+        """The number of the sequence's pose, which is the number of the sequence within its subject."""
         return index // self.instants
 
     def name(self, index: int) -> str:

@@ -107,7 +107,7 @@ class FallingThings(Tree):
         self._lenses = [(side, lenses[name]) for name, side in self._sides.items()]
 
     def sample_files(self, sample: Sample) -> Iterator[File | Piece]:
-        """A camera's picture, depth, classes and objects; raises UserError where an imported picture lacks a channel."""
+        """A camera's picture, depth, classes and objects; raises UserError if an imported picture lacks a channel."""
         for name in missing(CHANNELS, sample.channels):
             raise UserError(f"frame {sample.index}: expected channel {name}; found none")
         number = sample.instant if sample.sequence else sample.index - (sample.origin.sensor if sample.origin else 0)

@@ -306,7 +306,7 @@ def _known(entry: dict[str, Any]) -> tuple[NDArray[np.float64], float | None, fl
 
 
 def _number(value: Any) -> float:
-    """A finite number; raises ValueError or OverflowError for anything else, such as a text that Python would take for one."""
+    """A finite number; raises ValueError or OverflowError for anything else, such as a text that Python reads as a number."""
     if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
         raise ValueError(f"found {value!r:.40} where a finite number is expected")
     return float(value)

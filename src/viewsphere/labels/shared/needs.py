@@ -170,7 +170,9 @@ class Scanner(Protocol):
         ...
 
     def turning(self, seconds: float) -> Turning:
-        """Return the motion of the scene during the given seconds, in which the columns of the picture are measured in turn."""
+        """Return the motion of the scene during the given seconds, while the columns of the picture are measured one after
+        another.
+        """
         ...
 
 

@@ -36,7 +36,7 @@ class Sweep(Frozen):
         return self
 
     def pose(self, moment: float) -> Matrix4 | None:
-        """The pose at a moment, interpolated between two known poses on a straight line and the shorter rotation; None where
+        """The pose at a moment, interpolated between two known poses on a straight line and the shorter rotation; None if
         the thing is absent.
         """
         before, after, share = self._around(moment)

@@ -87,7 +87,7 @@ STRAIGHT = 1e-9
 
 
 def _baseline(left: Sensor, right: Sensor) -> float | None:
-    """Metres from the left sensor to the right one along x, None where they are not rectified in this order."""
+    """Metres from the left sensor to the right one along x, None if they are not rectified in this order."""
     if left.intrinsics != right.intrinsics or not left.intrinsics.lens.is_linear:
         return None
     a, b = np.array(left.rig_from_sensor), np.array(right.rig_from_sensor)

@@ -86,7 +86,7 @@ def parse_change(text: str, option: str = "--set", example: str = "viewpoints.el
 
 
 def _extended(path: Path, above: tuple[Path, ...], known: dict[str, _Layer]) -> _Layer:
-    """A file merged over those that it extends; each is read once, however many others extend it."""
+    """A file merged over those that it extends; each is read once, even if several others extend it."""
     place = os.path.abspath(path)  # noqa: PTH100, links are kept: paths in a file are relative to where it was found
     if place not in known:
         known[place] = _joined(path, above, known)

@@ -10,7 +10,7 @@ from typing import Any, cast
 from viewsphere.validation.errors import Path, dotted, mistakes_at
 
 _PRESENT = {"azimuth_deg": "azimuth", "elevation_deg": "elevation", "tilt_deg": "tilt"}
-"""Former names, with those that replaced them."""
+"""Former names, with their replacements."""
 
 _ENTRIES = frozenset({"sun", "night", "at", "jitter"})
 """Entries of a scene that had fields with these names. Options of third-party plug-ins may still have them."""

@@ -130,7 +130,7 @@ def write(dataset: Dataset, formats: Entries, tell: Listener = null_listener, wo
 
 
 def is_written(entry: FormatEntry, dataset: Dataset, least: float | None) -> bool:
-    """Return whether a format's export in a data set's folder equals what would be written now, judged by its list of files."""
+    """Return whether a format's export in a data set's folder is up to date and complete, judged by its list of files."""
     folder = dataset.root / entry.name
     is_whole = written_frames(folder) == len(dataset) and written_options(folder) == entry.whole().options
     return is_whole and not is_out_of_date(entry.name, dataset, least)

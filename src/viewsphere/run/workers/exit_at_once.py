@@ -1,4 +1,4 @@
-"""The end of a process without the third of a second in which Python and LLVM free their objects."""
+"""Ends a process without waiting a third of a second for Python and LLVM to free their objects."""
 
 from __future__ import annotations
 

@@ -52,7 +52,7 @@ class Remote:
         return self.root.is_shared
 
     def others_at_work(self) -> bool:
-        """See `Place`; nothing is known of others."""
+        """See `Place`; other processes are not visible here."""
         return False
 
     def occupied(self) -> AbstractContextManager[Path]:
@@ -60,7 +60,7 @@ class Remote:
         return temporary("run")
 
     def locked(self) -> AbstractContextManager[None]:
-        """See `Place`; nothing is known of others."""
+        """See `Place`; other processes are not visible here."""
         return nullcontext()
 
     @contextmanager

@@ -23,7 +23,7 @@ def encode(channel: Channel, array: NDArray[Any], files: Files | None = None) ->
     """The bytes of a channel's file, in the format chosen by `files`.
 
     Raises ValueError for an array of another shape or dtype than the channel's, StoreError for ids above 65535,
-    MissingExtraError where a codec is not installed. Ids above 255 do not fit a palette: such a frame's map is a 16-bit PNG.
+    MissingExtraError if a codec is not installed. Ids above 255 do not fit a palette: such a frame's map is a 16-bit PNG.
     """
     from viewsphere.codecs import exr, npz, pictures, png_tiff
 
@@ -87,7 +87,7 @@ def decode(channel: Channel, file: Path, read: Callable[[], bytes] | None = None
     """The array in a channel's file of any kind, with the channel's dtype.
 
     Imported pictures may have any format that Pillow reads. `read` returns the file's bytes if they must be verified, or are
-    stored elsewhere. Raises StoreError if the file is missing or broken, MissingExtraError where its codec is not installed.
+    stored elsewhere. Raises StoreError if the file is missing or broken, MissingExtraError if its codec is not installed.
     """
     try:
         array = _decoded(channel, read() if read else read_bytes(file, "MAX_PICTURE_BYTES"))

@@ -203,7 +203,7 @@ class Baker:
     def metallic_roughness(
         self, metallic: Sampled | None, roughness: Sampled | None, plain_metallic: float, plain_roughness: float
     ) -> Texture | None:
-        """The texture of both, roughness in green and metallic in blue; None where both are constants."""
+        """The texture of both, roughness in green and metallic in blue; None if both are constants."""
         first = roughness or metallic
         if first is None:
             return None

@@ -32,7 +32,7 @@ def headed(pose: Pose, direction: ArrayLike, heading: Heading) -> Pose:
 
 
 def to_the_right(direction: ArrayLike) -> Float:
-    """The level unit vector (3,) to the right of a direction (3,), seen from above; zero where it is vertical."""
+    """The level unit vector (3,) to the right of a direction (3,), seen from above; zero if it is vertical."""
     x, y, _ = np.asarray(direction, np.float64).tolist()
     level = math.hypot(x, y)
     return np.zeros(3) if level < LEVEL else np.array([y / level, -x / level, 0.0])

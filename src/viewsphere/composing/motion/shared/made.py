@@ -81,12 +81,12 @@ class Mover:
     moves: tuple[Move, ...]
 
     def state(self, time: float) -> tuple[Matrix4 | None, TimeStep | None]:
-        """World from object at a time, seconds, to 1e-10 m, None where the thing is absent; and the time step of its file."""
+        """World from object at a time, seconds, to 1e-10 m, None if the thing is absent; and the time step of its file."""
         pose = self._at(time)
         return (None, None) if pose is None else (_recorded(pose, self.start.placed), pose.step)
 
     def motion_at(self, times: Sequence[float]) -> Motion:
-        """Return the poses and time steps of the thing at successive times, seconds; a single value for all times where they
+        """Return the poses and time steps of the thing at successive times, seconds; a single value for all times if they
         are equal.
         """
         poses, steps = zip(*map(self.state, times), strict=True)
@@ -101,9 +101,9 @@ class Mover:
 
 
 def mover(motions: Motions | None, start: Start) -> Mover:
-    """Return the mover of one thing for these motions; without motions the thing stays still.
-    Each motion changes the pose from the previous motions. A thing is absent while any motion reports it absent.
-    Raises RecipeError where a motion is impossible.
+    """Return the mover of one thing for these motions; without motions the thing stays still. Each motion changes the pose
+    from the previous motions. A thing is absent while any motion reports it absent. Raises RecipeError if a motion is
+    impossible.
     """
     return Mover(start, tuple(_moves(motions, start)))
 

@@ -35,7 +35,7 @@ class Pose:
         return replace(self, matrix=rigid(self.matrix[:3, :3], self.matrix[:3, 3] + np.asarray(by, np.float64)))
 
     def turned(self, rotation: ArrayLike) -> Pose:
-        """Turned by a rotation (3, 3) about its own axes, its own origin staying where it is."""
+        """Turned by a rotation (3, 3) about its own axes and its own origin."""
         return replace(self, matrix=compose(self.matrix, rigid(rotation, (0.0, 0.0, 0.0))))
 
     def put(self, at: ArrayLike) -> Pose:
@@ -44,7 +44,7 @@ class Pose:
         return replace(self, matrix=rigid(self.matrix[:3, :3], (x, y, z + self.matrix[2, 3])))
 
     def facing(self, rotation: ArrayLike) -> Pose:
-        """Turned to a rotation (3, 3), world from object, its origin staying where it is."""
+        """Turned to a rotation (3, 3), world from object, about its origin, which does not move."""
         return replace(self, matrix=rigid(rotation, self.matrix[:3, 3]))
 
 
@@ -56,9 +56,9 @@ class Start:
     seconds: length of the sequence.
     rng: a generator for the values drawn for these names.
     lanes: lanes of the place, world axes.
-    timeline: frames of the model's file while its clip plays, None where the file has none.
+    timeline: frames of the model's file while its clip plays, None if the file has none.
     field: the recipe's field, with which messages begin.
-    way: the thing's pose on the path to its place, at a time in seconds from the path's start; None where it has no path.
+    way: the thing's pose on the path to its place, at a time in seconds from the path's start; None if it has no path.
     """
 
     placed: Matrix4

@@ -71,7 +71,7 @@ def scattered(
 
 
 def _check_size(spec: ModelSpec, shape: Shape, floor: Footprint | None, field: str) -> None:
-    """Raise RecipeError for a model that is larger than the floor, however it is turned."""
+    """Raise RecipeError for a model that is larger than the floor at every turn."""
     size = Box3d(shape.box).diagonal[:2]
     if floor is None or (size.min() <= 2 * floor.half.min() and size.max() <= 2 * np.linalg.norm(floor.half)):
         return

@@ -132,7 +132,7 @@ class Keeper:
         raise ModelError(f"{named}: {died}")
 
     def forget(self) -> None:
-        """Mark the scene in Blender as belonging to no stage; for the next picture, Blender builds its scene."""
+        """Mark the scene in Blender as outdated, so that Blender builds it again for the next picture."""
         self._stage = None
 
     def drop(self) -> None:

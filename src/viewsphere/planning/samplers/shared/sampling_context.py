@@ -272,7 +272,7 @@ class SamplingContext(Sendable):
         return _lens(self.recipe, subject, self.scene_name(pose))
 
     def finish(self, subject: str, pose: int) -> Finish | None:
-        """The finish of a subject's frame, None where all frames of a shot share one."""
+        """The finish of a subject's frame, None if all frames of a shot share one."""
         if not self.scenes.has_finish_per_frame:
             return None
         return self.scenes.finish(subject, self.pose_list.name(pose), self.pose_list.place(pose))

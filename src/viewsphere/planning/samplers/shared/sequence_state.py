@@ -139,21 +139,21 @@ def middle(things: Sequence[Thing], box_of: BoxOf) -> Vector:
 def target_moving(
     context: SamplingContext, thing: Thing, slot: int, names: Names, lanes: tuple[Lane, ...], way: Way | None = None
 ) -> Moving | None:
-    """Return the movement of the target with this number in the sequence of these names; None where it stands still."""
+    """Return the movement of the target with this number in the sequence of these names; None if it stands still."""
     return _moving(context, thing, *_motions(context, thing.model, slot), (*names, str(slot), thing.model.key), lanes, way)
 
 
 def piece_moving(
     context: SamplingContext, thing: Thing, piece: SceneryPiece, names: Names, lanes: tuple[Lane, ...]
 ) -> Moving | None:
-    """Return the movement of a piece of scenery in the sequence of these names; None where it stands still."""
+    """Return the movement of a piece of scenery in the sequence of these names; None if it stands still."""
     return _moving(context, thing, piece.motion, piece.field, (*names, piece.name), lanes)
 
 
 def _distractor_moving(
     context: SamplingContext, thing: Thing, way: Way | None, names: Names, lanes: tuple[Lane, ...]
 ) -> Moving | None:
-    """Return the movement of a model that is not labelled; None where it stands still."""
+    """Return the movement of a model that is not labelled; None if it stands still."""
     number = {spec.key: number for spec, number in context.distractors}[thing.model.key]
     motions, field = context.recipe.models[number].motion, f"models[{number}].motion"
     return _moving(context, thing, motions, field, (*names, "distractor", thing.model.key), lanes, way)
@@ -168,7 +168,7 @@ def _moving(
     lanes: tuple[Lane, ...],
     way: Way | None = None,
 ) -> Moving | None:
-    """Return the movement of a thing, drawn for these names; None where it stands still."""
+    """Return the movement of a thing, drawn for these names; None if it stands still."""
     if motions is None:
         return None
     time, rng = time_of(context), partial(generator, context.recipe.seed, "motion", *names)
@@ -192,7 +192,7 @@ def _motions(context: SamplingContext, spec: ModelSpec, slot: int) -> tuple[Moti
 def _rig(
     context: SamplingContext, state: SequenceState, subject: str, start: int, lanes: tuple[Lane, ...], box_of: BoxOf
 ) -> tuple[RigPose, ...] | None:
-    """Return the rig's poses at all instants, None where it stands still."""
+    """Return the rig's poses at all instants, None if it stands still."""
     time, views = time_of(context), context.sequences_of(subject)
     times = np.array([time.seconds_at(i) for i in range(time.count)])
     names = (subject, context.pose_list.place(start), *redraw_names(context.redraw))
