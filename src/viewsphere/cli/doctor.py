@@ -43,7 +43,9 @@ def doctor(
     ] = None,
     json_: AsJson = False,
 ) -> None:
-    """Report features that work on this machine: processor, kernels, optional packages, Blender. Missing ones are no error."""
+    """Report features that work on this machine: processor, kernels, optional packages, Blender.
+    Missing features are not errors.
+    """
     if setup_blender:
         _set_up_blender()
     downloads: Mapping[str, Download] = _downloads() if setup else {}
