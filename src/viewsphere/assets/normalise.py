@@ -16,6 +16,7 @@ from viewsphere.model.model_spec import Axis, ModelSpec, Size
 from viewsphere.model.scene import Matrix4
 
 PROPORTION_TOLERANCE = 0.1
+"""Largest relative difference between a model's and its real size without a warning; chosen, not measured."""
 
 
 def normalise(mesh: Mesh, facts: FileFacts, spec: ModelSpec, first: tuple[Mesh, FileFacts] | None = None) -> Mesh:

@@ -27,8 +27,11 @@ GRAPHICS = (
     "graphics card, or the card's driver"
 )
 PROBE_S = 60.0
+"""Seconds for Blender's start and its answer; a hanging start ends after this time."""
 DRAW_S = 60.0
+"""Seconds for a tiny picture of OpenGL; a hanging driver ends after this time."""
 ASK_S = 20.0
+"""Seconds for a program that only prints facts."""
 
 PACKAGES = {
     "libEGL.so.1": "libegl1",

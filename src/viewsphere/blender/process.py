@@ -46,6 +46,7 @@ LEAST_MEMORY = 2 << 30
 
 PREFIX = "viewsphere-blender-"
 TAIL_BYTES, TAIL_LINES = 4096, 6
+"""The end of Blender's log that an error message has."""
 
 SHELLS_SIGNALS = 128
 """The number that a shell adds to a signal's number to make an exit status (POSIX, "Exit Status for Commands")."""

@@ -30,6 +30,7 @@ LEDGER = "written"
 """A cache file whose length records how much was written since the last scan, in units of `UNIT` of the limit."""
 
 UNIT = 1 / 4096
+"""A byte of the ledger represents this share of the limit: the ledger has 128 bytes when a scan is due."""
 
 KERNELS, KERNELS_S = "kernels", 30 * 86_400.0
 """The kind that is deleted last, unless unused for this many seconds. Kernels are small compared to light and slow to make, and

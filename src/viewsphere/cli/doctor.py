@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from viewsphere.plugins.source import Download
 
 LEFT = 12
+"""Width of the column of names, in characters."""
 
 
 def doctor(

@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     from viewsphere.store.shots.heartbeat import Heartbeat
 
 MOST_FINDINGS = 20
+"""Largest number of lines of findings; `--json` lists all."""
 
 CLOSED = 141
 """Exit status of a command whose output has no reader any more, as for SIGPIPE in a shell."""

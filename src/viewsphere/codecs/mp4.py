@@ -39,6 +39,7 @@ REPEATABLE = ("-map_metadata", "-1", "-fflags", "+bitexact", "-flags:v", "+bitex
 """Options that keep dates and versions out of the file, so that equal pictures give equal bytes."""
 
 ANSWER_S = 60.0
+"""Seconds for ffmpeg's list of encoders; a hanging program ends after this time."""
 
 GRACE_S = 5.0
 """Seconds in which ffmpeg may exit by itself once it has stopped reading."""

@@ -37,6 +37,7 @@ from viewsphere.store import Dataset
 
 ROOT = "VOC2012"
 TRUNCATED = 0.15
+"""Share outside the image above which an object counts as truncated."""
 NAMES = r"[^\x00-\x1f]+"
 
 

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from PIL.ImageDraw import ImageDraw
 
 TOLERANCE = 1e-9
+"""Length of a front's level part below which the object points straight up or down."""
 
 
 @dataclass(frozen=True)

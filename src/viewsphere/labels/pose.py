@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from PIL.ImageDraw import ImageDraw
 
 TOLERANCE = 1e-9
+"""Tolerance of a pose's entries as a share of their size: rounding errors of float64 are a million times smaller."""
 
 
 def fields(placement: Placement) -> Mapping[str, Any]:

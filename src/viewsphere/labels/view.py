@@ -13,6 +13,7 @@ from viewsphere.labels.shared.spec import Drawing, Field, Models, ObjectLabel, r
 from viewsphere.model.sample import ObjectView, Sample
 
 TOLERANCE = 1e-6
+"""Tolerance of the camera's position, in metres at the object and as a share of the distance."""
 
 
 def prove(sample: Sample, models: Models) -> Iterator[str]:

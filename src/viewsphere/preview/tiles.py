@@ -23,8 +23,11 @@ from viewsphere.preview.frame import (
 from viewsphere.store.samples.films import Film, films_of
 
 MARGIN = 8
+"""Pixels between tiles, and around them."""
 CAPTION = 18
+"""Height of a tile's caption, in pixels."""
 SWATCH = 10
+"""Side of a legend's square of colour, in pixels."""
 
 Tile = tuple[Picture, str]
 """A picture and the words below it."""

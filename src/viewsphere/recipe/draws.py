@@ -40,6 +40,7 @@ if TYPE_CHECKING:
 KINDS = ("uniform", "log_uniform", "normal", "choice")
 
 DEEPEST = 16
+"""Deepest nesting of distributions, far below the depth at which Python's recursion ends."""
 
 NEARLY_ALWAYS = 3.0
 """Standard deviations around a normal distribution's mean within which 399 of 400 draws lie."""

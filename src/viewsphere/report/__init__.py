@@ -29,6 +29,7 @@ from viewsphere.store.samples.films import Film, films_of
 from viewsphere.urls import here
 
 GOLDEN = (5**0.5 - 1) / 2
+"""The golden ratio less 1: multiples of it, modulo 1, are evenly spread, for any number of frames."""
 
 
 LIMIT = 20_000_000
@@ -41,6 +42,7 @@ TRIANGLES = 240_000
 """Maximum number of triangles, of all meshes together and of one mesh."""
 
 MOST_TRIANGLES = 14_000
+"""Most triangles of a model in a page, which holds `TRIANGLES` in total."""
 
 CAMERAS = 600
 """Maximum number of cameras shown around a model."""

@@ -18,6 +18,7 @@ from viewsphere.report.unknown import numbers
 Float = NDArray[np.float64]
 
 BISECTIONS = 12
+"""Halvings in the search for a grid's cell, by ratio: the size is then within 0.2 % of the finest that fits."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -49,6 +49,7 @@ BLOCK = 4096
 """Allocation unit of most file systems, bytes."""
 
 GOLDEN = 0.6180339887498949
+"""The golden ratio less 1: multiples of it, modulo 1, are evenly spread over the shots."""
 
 
 @dataclass(frozen=True)

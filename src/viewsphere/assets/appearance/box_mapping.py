@@ -17,6 +17,7 @@ _UP = np.array([[0, 0, 1], [0, 0, 1], [0, 0, 1], [0, 0, 1], [0, 1, 0], [0, 1, 0]
 """The right and up directions of a viewer that faces the sides +x, -x, +y, -y, +z, -z of a box."""
 
 _GOLDEN = 0.6180339887498949
+"""The golden ratio less 1: multiples of it, modulo 1, shift the parts' textures by evenly spread amounts."""
 
 
 def box_mapped(mesh: Mesh, chosen: NDArray[np.bool_], grained: NDArray[np.bool_], rest: Mesh | None = None) -> Mesh:

@@ -59,6 +59,9 @@ MATERIALS = ("glass", "metal", "glossy", "matte")
 """Words for materials."""
 
 PLASTIC = 1.32471795724474602596
+"""The plastic number, root of x^3 = x + 1: its powers give evenly spread points in the plane (R2 sequence, M. Roberts,
+2018).
+"""
 
 
 def appearance_of(mesh: Mesh, color: str | None = None, material: str | None = None) -> Appearance:

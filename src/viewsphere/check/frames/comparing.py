@@ -17,8 +17,11 @@ from viewsphere.model.channel import PASSES, PICTURES
 from viewsphere.model.sample import Sample
 
 METRE_TOLERANCE = 1e-9
+"""Tolerance of a rotation's entries: rounding errors of products in float64 are a million times smaller."""
 ANGLE_TOLERANCE = 1e-6
+"""Tolerance of a pose computed from angles: radians, and a share of the distance."""
 SHARE_TOLERANCE = 1e-4
+"""Excess over 1 that a share in float32 may have, such as an albedo that an engine filters."""
 
 
 def files(sample: Sample) -> Iterator[str]:

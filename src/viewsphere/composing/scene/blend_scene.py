@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from viewsphere.assets.scene_file import SceneFile, SceneObject
 
 NAMES_SAID = 5
+"""Largest number of names in a message, which is one line."""
 
 Turn = Callable[[Names], int]
 """Returns the number of the model or frame of a draw, in the data set's order."""

@@ -28,6 +28,7 @@ from viewsphere.validation.errors import shown
 Float = NDArray[np.float64]
 
 MOST_TURNS = 1_000
+"""Limit of turns in one path, which protects from files made by mistake."""
 
 
 class Turn(Frozen):

@@ -30,7 +30,9 @@ SHORTEST = 1e-3
 
 Number = TypeVar("Number", int, float)
 MOST_TRACKS = 10**6
+"""Largest number of a frame or track in an imported file; larger ones are mistakes."""
 COLUMNS = 15
+"""Columns of an object's line, without a score."""
 DONT_CARE_TYPE = "DontCare"
 
 

@@ -13,6 +13,7 @@ from viewsphere.model.sample import ObjectAnnotation, Sample
 from viewsphere.store import Dataset
 
 FOLDER_SIZE = 10_000
+"""Largest number of entries in a folder: file managers and object stores list more of them slowly."""
 
 
 class Entry(NamedTuple):

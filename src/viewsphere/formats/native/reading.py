@@ -33,8 +33,11 @@ from viewsphere.store.paths import file_inside, files_inside, is_name
 from viewsphere.store.texts import parsed
 
 RIGHT_ANGLES = 1e-3
+"""Largest deviation from orthogonality of an imported rotation, whose digits may be few."""
 LONGEST_NAME = 150
+"""Longest name of a split or model, in bytes: file names have at most 255, and the export adds to them."""
 LARGEST_POSE = 10_000_000
+"""Limit of a pose's number in an imported file; larger ones are mistakes."""
 
 
 def read(path: Path, *, keep_going: bool = False) -> ForeignDataset:

@@ -22,6 +22,7 @@ FARTHEST = 1e6
 """Limit of all numbers of an annotation: pixels, degrees or lengths."""
 
 MOST_ID = 10**6
+"""Largest id in an imported record; larger ones are mistakes."""
 FLAGS = ("truncated", "occluded", "difficult")
 VIEW = ("azimuth", "elevation", "theta", "distance", "focal", "viewport", "px", "py")
 COARSE = ("azimuth_coarse", "elevation_coarse")

@@ -17,6 +17,7 @@ from viewsphere.recipe.world.scene import CameraEntry, CameraMatrix, PictureSize
 from viewsphere.validation.errors import shown
 
 MOST_SENSORS = 64
+"""Limit of sensors in a rig, which protects from files made by mistake."""
 AXES = "OpenCV axes of the first sensor: x right, y down, z forward"
 OWN_LENSES = ("fov_deg", "focal_px", "K", "projection")
 LENS_FIELDS = ("size", *(name for name in CameraEntry.LENS if name != "of_viewpoints"), "projection")

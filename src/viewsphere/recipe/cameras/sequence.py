@@ -10,6 +10,7 @@ from viewsphere.model.fields.frozen import Frozen
 from viewsphere.model.fields.numbers import Count, Number, Positive
 
 MOST_INSTANTS = 1_000_000
+"""Limit of instants in a sequence, equal to the default of `max_frames`."""
 
 
 class TimeEntry(Frozen):

@@ -15,6 +15,7 @@ from viewsphere.recipe.cameras.aim import SHAKE, Bins, Shake
 from viewsphere.recipe.values import shape_of
 
 MOST_POINTS = 10_000
+"""Limit of points in a path, which protects from files made by mistake."""
 
 Place = tuple[Metres, Metres, Metres]
 Spot = tuple[Metres, Metres]

@@ -26,6 +26,7 @@ from viewsphere.plugins.source import rooms_of
 from viewsphere.run.shots.stages import Stages
 
 DIRECTIONS = 64
+"""Rays of the upper hemisphere that are cast: the share of hits has steps of 1/64."""
 
 
 Float = NDArray[np.float64]

@@ -31,6 +31,7 @@ NEAR = 2e-3
 """Greatest deviation of a key's time from a frame, in frames: files store times in single precision."""
 
 LEAST, MOST = 1.0, 1000.0
+"""Frames per second that an animation may have; other rates are ignored."""
 
 
 def rate_of(document: Document) -> float:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import bpy
 
 NAMES_SAID = 5
+"""Largest number of names in a message, which is one line."""
 DRIVEN = "objects", "meshes", "curves", "shape_keys", "materials", "armatures", "lights", "cameras", "worlds", "scenes"
 
 

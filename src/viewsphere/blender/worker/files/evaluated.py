@@ -15,6 +15,7 @@ SOLID = ("MESH", "META")
 LEFT_OUT = {"CURVES": "hair", "POINTCLOUD": "points", "VOLUME": "a volume", "GREASEPENCIL": "grease pencil"}
 STRANDS = "particle hair"
 NAMES_SAID = 5
+"""Largest number of names in a message, which is one line."""
 
 OWN_SLASH = "\u2215"
 """Replacement for a slash in an object's name."""

@@ -21,6 +21,7 @@ IMPORTS = {
 }
 SAME = {"gltf": "glb", "usda": "usd", "usdc": "usd", "usdz": "usd"}
 NAMES_SAID = 8
+"""Largest number of similar names in a message, which is one line."""
 
 
 def open_file(file, kind, root, cameras=False, clip=None, fps=None):

@@ -22,6 +22,7 @@ NEAR = 2e-3
 """Largest distance of a time from a frame, in frames: files store times in single precision."""
 
 LEAST, MOST = 1.0, 1000.0
+"""Frames per second that an animation may have."""
 
 
 def own_rate(file, kind):

@@ -31,6 +31,7 @@ PARAMETERS = {
 """Parameters of the camera models that have an exact counterpart here, in COLMAP's order."""
 
 MOST_IN_ONE_LINE = 10
+"""Words of an image's line in images.txt; the last is the name, which may have spaces."""
 
 
 def read_colmap(path: Path) -> PoseFile:

@@ -42,6 +42,7 @@ STAGE_SECONDS = 600.0
 """Seconds after which a Blender that has not built its scene counts as hung."""
 
 FRAME_SECONDS = 3600.0
+"""Seconds for one picture; a Blender that hangs is killed after this time."""
 
 FIRST_SECONDS = 900.0
 """Seconds after which a renderer that has not drawn its first, tiny picture counts as hung. It compiles its shaders first,
