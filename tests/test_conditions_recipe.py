@@ -14,7 +14,7 @@ NAMES = ["morning", "overcast", "fog", "rain", "snow", "night"]
 
 def test_every_shot_is_planned_under_every_condition():
     planned = plan(RECIPE)
-    assert [subject.rpartition("-")[2] for subject in planned.taken] == NAMES
+    assert [subject.rpartition("-")[2] for subject in planned.varied_subjects] == NAMES
     assert planned.frames == 6 and planned.factors.endswith("x 6 variations") and not planned.warnings
     scenes = {name: planned._under[name].scene(planned.subjects[0], "") for name in NAMES}
     assert 5 < scenes["morning"].sun.elevation < 25 and scenes["night"].lamps

@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any
 
 from viewsphere import plugins
 from viewsphere.caches import cache_of
-from viewsphere.caches.entries import kept, making, note_use
+from viewsphere.caches.entries import cached, making, note_use
 from viewsphere.files import read_bytes
 from viewsphere.scratch import temporary
 
@@ -116,7 +116,7 @@ def build_zoo_model(spec: ModelSpec) -> Mesh | Path:
     from viewsphere.assets.primitive import FileFacts
 
     facts = FileFacts(Path(spec.source), "zoo", "+z", "-y", 1.0)
-    return kept(
+    return cached(
         "zoo",
         hashlib.sha256(f"{_digest(name)} {name} {spec.seed} {spec.size}".encode()).hexdigest(),
         lambda: sorted_by_part(_built_to_size(name, spec)),

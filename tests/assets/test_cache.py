@@ -170,13 +170,13 @@ def test_what_a_file_tells_is_asked_again_where_an_entry_is_damaged(monkeypatch,
         return {"seconds": 2.5}, [file, beside]
 
     for _ in range(2):
-        assert cache.kept(file, "timeline", ask) == {"seconds": 2.5}
+        assert cache.cached_facts(file, "timeline", ask) == {"seconds": 2.5}
     assert len(asked) == 1
     (entry,) = cache_folder().iterdir()
     whole = entry.read_bytes()
     entry.write_bytes(whole.replace(b"2.5", b"3.5"))
-    assert cache.kept(file, "timeline", ask) == {"seconds": 2.5}
+    assert cache.cached_facts(file, "timeline", ask) == {"seconds": 2.5}
     assert entry.read_bytes() == whole
     write("m/beside.bin", b"2")
-    cache.kept(file, "timeline", ask)
+    cache.cached_facts(file, "timeline", ask)
     assert len(asked) == 3

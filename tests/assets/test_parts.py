@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from viewsphere.assets.mesh import Image, Material, Mesh, Texture
-from viewsphere.assets.parts import is_taken, own_part, taken
+from viewsphere.assets.parts import is_taken, own_part, selected_parts
 from viewsphere.errors import ModelError
 from viewsphere.model.model_spec import ModelSpec, Parts
 
@@ -48,7 +48,7 @@ def spec(**parts):
 )
 def test_an_objects_parts_are_its_own_and_what_it_instances(parts, names):
     mesh = whole()
-    found = taken(mesh, spec(**parts))
+    found = selected_parts(mesh, spec(**parts))
     assert list(found.parts) == names
     assert len(found.triangles) == len(names)
     for k, name in enumerate(names):
@@ -63,7 +63,7 @@ def test_an_objects_parts_are_its_own_and_what_it_instances(parts, names):
 
 def test_parts_stand_in_their_own_axes():
     mesh = whole()
-    found = taken(mesh, spec(only=("Road",), file_from_axes=TURNED))
+    found = selected_parts(mesh, spec(only=("Road",), file_from_axes=TURNED))
     axes = np.array(TURNED)
     assert np.allclose(found.vertices @ axes[:3, :3].T + axes[:3, 3], mesh.vertices[9:])
     assert np.allclose(found.normals @ axes[:3, :3].T, mesh.normals[9:])
@@ -78,7 +78,7 @@ def test_a_slash_in_an_objects_name_is_not_that_of_an_instance():
 
 def test_nothing_taken_is_one_line():
     with pytest.raises(ModelError, match=r"street.blend: expected triangles of Bus, found none"):
-        taken(whole(), spec(only=("Bus",)))
+        selected_parts(whole(), spec(only=("Bus",)))
 
 
 def test_parts_of_one_model_share_it():

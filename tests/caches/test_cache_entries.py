@@ -13,7 +13,7 @@ import pytest
 
 from viewsphere.caches import arrays, budget, cache_of
 from viewsphere.caches.arrays import Content
-from viewsphere.caches.entries import PREFIX, SUFFIX, kept, making, read_entry, write_entry
+from viewsphere.caches.entries import PREFIX, SUFFIX, cached, making, read_entry, write_entry
 from viewsphere.scratch import of_this_process
 
 
@@ -39,7 +39,7 @@ def made(name, size=1000):
         calls.append(name)
         return name
 
-    held = kept("light", name, make, lambda value: Content(value, {"b": np.zeros(size)}), lambda content: content.about)
+    held = cached("light", name, make, lambda value: Content(value, {"b": np.zeros(size)}), lambda content: content.about)
     assert held == name
     return bool(calls)
 
@@ -72,8 +72,8 @@ def test_an_entry_of_another_version_is_made_anew():
     def unpack(content):
         return content.about["this"]
 
-    assert kept("light", "a", lambda: 5, lambda value: Content({"this": value}, {}), unpack) == 5
-    assert kept("light", "a", lambda: pytest.fail("made twice"), lambda _: Content(0, {}), unpack) == 5
+    assert cached("light", "a", lambda: 5, lambda value: Content({"this": value}, {}), unpack) == 5
+    assert cached("light", "a", lambda: pytest.fail("made twice"), lambda _: Content(0, {}), unpack) == 5
 
 
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no pipes here")

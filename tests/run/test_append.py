@@ -25,7 +25,7 @@ from shots import unit_box
 from small import small_recipe, tree_hash
 from viewsphere import Dataset, generate
 from viewsphere.check import check
-from viewsphere.composing.viewpoints.pose_numbers import kept, names_of
+from viewsphere.composing.viewpoints.pose_numbers import joined_digests, names_of
 from viewsphere.errors import ModelError, RecipeError, StoreError, UserError
 from viewsphere.model.sample import ObjectAnnotation
 from viewsphere.planning import fitting
@@ -558,7 +558,7 @@ def test_poses_that_a_merged_data_set_has_twice_are_there():
     once = whole(vs.plan(recipe())).record
     first = once.parts[0]
     block = replace(first.blocks[0], subjects=("post_box_002",), positions=((6, 12),))
-    again = replace(first, first=12, frames=6, blocks=(block,), new_poses=6, pose_names=kept(names_of(once)))
+    again = replace(first, first=12, frames=6, blocks=(block,), new_poses=6, pose_names=joined_digests(names_of(once)))
     twice = replace(once, poses=12, frames=18, parts=(first, again))
     assert extend(vs.plan(recipe(models=models(3))), twice).adds_nothing
     more = extend(vs.plan(recipe(models=models(4), viewpoints=DENSER)), twice)

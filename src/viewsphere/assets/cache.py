@@ -23,7 +23,7 @@ from viewsphere.assets.mesh import Mesh
 from viewsphere.assets.mesh_file import read_mesh, unpacked
 from viewsphere.assets.metadata.part_points import part_points
 from viewsphere.assets.normalise import normalise, placed
-from viewsphere.assets.parts import taken
+from viewsphere.assets.parts import selected_parts
 from viewsphere.assets.paths.inside import split_source
 from viewsphere.assets.primitive import FileFacts, extents
 from viewsphere.assets.readers import third_party_sources
@@ -73,7 +73,7 @@ def load(
     frame = frame_of(spec, step)
     if spec.parts is not None:
         whole, facts = load(spec.whole, folder, None if frame is None else TimeStep(frame=frame))
-        return taken(whole, spec, step), facts
+        return selected_parts(whole, spec, step), facts
     named = source_of(spec.source)
     if named is not None:
         built = _built(spec, named)
@@ -130,7 +130,7 @@ def read_ahead(spec: ModelSpec, frames: Iterable[int], folder: Path | None = Non
                 _store(folder, lacking[frame], path, named, file)
 
 
-def kept(path: Path, about: str, ask: Callable[[], tuple[Any, Iterable[Path]]]) -> Any:
+def cached_facts(path: Path, about: str, ask: Callable[[], tuple[Any, Iterable[Path]]]) -> Any:
     """Return the plain data that `ask` computes from a file, from the cache while the file is unchanged. `ask` also returns the
     files that it read, which must be unchanged, too.
     """

@@ -21,7 +21,7 @@ OWN_SLASH = "\u2215"
 """The character that replaces a slash in an object's name in the part names of Blender's worker."""
 
 
-def taken(mesh: Mesh, spec: ModelSpec, step: TimeStep | None = None) -> Mesh:
+def selected_parts(mesh: Mesh, spec: ModelSpec, step: TimeStep | None = None) -> Mesh:
     """Return the parts of a whole model's mesh that `spec.parts` selects at a time step, with the materials and images that
     they use.
 

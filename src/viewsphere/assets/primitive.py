@@ -101,16 +101,16 @@ def compact(piece: Primitive) -> Primitive:
 def pick(piece: Primitive, vertices: NDArray[np.integer]) -> Primitive:
     """The piece with these of its vertices, in this order; its triangles are unchanged."""
 
-    def taken(array: Float | None) -> Float | None:
+    def selected(array: Float | None) -> Float | None:
         return None if array is None else array[vertices]
 
     return replace(
         piece,
         positions=piece.positions[vertices],
-        normals=taken(piece.normals),
-        uv0=taken(piece.uv0),
-        uv1=taken(piece.uv1),
-        colors=taken(piece.colors),
+        normals=selected(piece.normals),
+        uv0=selected(piece.uv0),
+        uv1=selected(piece.uv1),
+        colors=selected(piece.colors),
     )
 
 

@@ -30,7 +30,7 @@ RECENT_S = 600.0
 T = TypeVar("T")
 
 
-def kept(kind: str, digest: str, make: Callable[[], T], pack: Callable[[T], Content], unpack: Callable[[Content], T]) -> T:
+def cached(kind: str, digest: str, make: Callable[[], T], pack: Callable[[T], Content], unpack: Callable[[Content], T]) -> T:
     """The result of `make`, read from the cache if it has an entry of this kind and digest."""
     file = cache_of(kind) / f"{digest}{SUFFIX}"
     content = read_entry(file)

@@ -68,7 +68,7 @@ def _claimed(dataset: Dataset, row: Row) -> set[tuple[str, int]]:
     part = dataset.plan.parts[row.part]
     shot = dataset.store.labelled(row.key) if part.recipe.get("rig") and not part.merged else None
     if shot is not None:
-        return {(name, number) for number, _, sensor in shot.samples for name in shot.kept(sensor)}
+        return {(name, number) for number, _, sensor in shot.samples for name in shot.kept_channels(sensor)}
     return {(name, number) for name in dataset.plan.channels for number in range(row.first, row.first + row.count)}
 
 

@@ -78,7 +78,7 @@ class Compared:
         if shot is None or "instances" not in sample.files:
             self._left_out["of which no shot or no instance map is known"] += 1
             return None
-        instant, sensor = self._scenery.taken(sample, shot)
+        instant, sensor = self._scenery.position(sample, shot)
         now, around = shot.model_copy(update={"things": shot.things_at(instant)}), self._scenery.around(key)
         changed = [thing.key for thing in now.things if not thing.id and self._scenery.mesh(around, thing) is None]
         if changed:

@@ -71,18 +71,18 @@ class TimedPoses(RepeatedPoses):
         """Number of moments, then the counts of the poses."""
         return {"time steps": len(self.moments), **self.base.counts}
 
-    def taken(self, index: int) -> int:
+    def base_number(self, index: int) -> int:
         """The number of the pose without its moment."""
         return index % len(self.base)
 
     def name(self, index: int) -> str:
         """The names of the pose and the moment."""
         moment = self._moment(index)
-        name = self.base.name(self.taken(index))
+        name = self.base.name(self.base_number(index))
         return name if moment is None else f"{name} at frame {moment.frame}, {moment.seconds!r} s"
 
     def _pose(self, index: int) -> Viewpoint:
-        return self.base[self.taken(index)].model_copy(update={"index": index, "time": self._moment(index)})
+        return self.base[self.base_number(index)].model_copy(update={"index": index, "time": self._moment(index)})
 
     def _moment(self, index: int) -> Moment | None:
         return self.moments[index // len(self.base)]

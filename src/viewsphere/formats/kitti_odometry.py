@@ -64,7 +64,7 @@ class KittiOdometry(Tree):
 
     def sample_files(self, sample: Sample) -> Iterator[File | Piece]:
         """Yield the files of a sensor's sample: its picture or points, and, with the left camera, the pose."""
-        course, (shot, instant, place) = self._timeline.course(sample), self._timeline.taken(sample)
+        course, (shot, instant, place) = self._timeline.course(sample), self._timeline.position(sample)
         car = car_in(shot, "kitti_odometry")
         number, frame = f"{course.number:02d}", f"{sample.instant:06d}"
         if place == car.lidar:

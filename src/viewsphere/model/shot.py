@@ -150,9 +150,9 @@ class Shot(Frozen):
         lens, zoomed = self.rig.sensors[sensor].intrinsics, self.instants[instant].intrinsics
         return zoomed if zoomed is not None and lens == self.rig.sensors[0].intrinsics else lens
 
-    def kept(self, sensor: int) -> tuple[str, ...]:
+    def kept_channels(self, sensor: int) -> tuple[str, ...]:
         """The channels that a sensor keeps, counted from 0 in the rig."""
-        return self.rig.sensors[sensor].kept(self.channels)
+        return self.rig.sensors[sensor].kept_channels(self.channels)
 
     def things_during(self, instant: int, moment: float) -> tuple[Thing, ...]:
         """Return the things at a moment (see `Sweep`) after an instant, while the shutter is open, as still things.

@@ -26,7 +26,7 @@ from viewsphere.composing.viewpoints.pose_numbers import (
     flat,
     follows_from_recipe,
     has_poses_of,
-    kept,
+    joined_digests,
     numbered,
 )
 from viewsphere.errors import RecipeError
@@ -124,7 +124,7 @@ class DatasetPart(Sendable):
     def subjects(self) -> tuple[str, ...]:
         """The subjects of the shots, each once; of the whole part, all subjects of the plan."""
         if self.shard.is_all:
-            return self.plan.taken
+            return self.plan.varied_subjects
         return tuple(dict.fromkeys(subject for index in self.indices for subject, shots in index.counts.items() if shots))
 
     def find(self, key: str) -> Row | None:
@@ -232,7 +232,7 @@ def extend(planned: Plan, there: PlanRecord) -> DatasetPart:
         shot_frames=planned.shot_frames,
         settings=settings(planned),
         new_poses=poses,
-        pose_names=None if not there.poses and follows_from_recipe(planned.pose_list) else kept(names),
+        pose_names=None if not there.poses and follows_from_recipe(planned.pose_list) else joined_digests(names),
         dealt_splits={key: name for key, name in planned.dealt_splits.items() if key not in held_splits},
     )
     record = PlanRecord(
@@ -299,7 +299,7 @@ def _missing(planned: Plan, there: PlanRecord, wanted: Sequence[int]) -> Iterato
 
 def _supplies(planned: Plan, there: PlanRecord, wanted: Sequence[int]) -> Iterator[tuple[int, tuple[str, ...]]]:
     """Wanted channels that frames of earlier parts lack: the part's number, and the channels in the table's order."""
-    subjects = set(planned.taken)
+    subjects = set(planned.varied_subjects)
     for number, part in enumerate(there.parts):
         if not part.is_sampled or not part.frames:
             continue

@@ -155,16 +155,16 @@ class Plan(Shown, SamplingContext):
         """Split -> number of its frames; for more than `COUNTED` hashed frames, the expected number."""
         by, drawn = self.recipe.splits.by, self.recipe.scenes is not None and self.recipe.splits.by == "model"
         counts = Counter({name: 0 for name in self.splits})
-        if by in ("model", "scene", "sequence") and not (drawn and len(self.taken) > COUNTED):
+        if by in ("model", "scene", "sequence") and not (drawn and len(self.varied_subjects) > COUNTED):
             for block in self.blocks:
                 for subject in block.subjects:
                     counts[self.split(subject, block.positions[0][0])] += block.size * block.each
         elif drawn:
-            some = Counter(self.split(subject, 0) for subject in self.taken[:COUNTED])
+            some = Counter(self.split(subject, 0) for subject in self.varied_subjects[:COUNTED])
             counts = Counter(quotas({name: some[name] / COUNTED for name in self.splits}, self.frames))
         elif by == "pose" and len(self.blocks) == 1 and self.poses <= COUNTED:
             for pose in numbers(self.blocks[0].positions):
-                counts[self.split(self.taken[0], pose)] += len(self.taken) * len(self.rig.sensors)
+                counts[self.split(self.varied_subjects[0], pose)] += len(self.varied_subjects) * len(self.rig.sensors)
         elif self.frames <= COUNTED:
             taken = (self.split(s, i) for block in self.blocks for s in block.subjects for i in numbers(block.positions))
             counts.update(chain.from_iterable(repeat(name, len(self.rig.sensors)) for name in taken))
@@ -209,7 +209,7 @@ class Plan(Shown, SamplingContext):
         """The split of a frame.
 
         Args:
-            subject: The subject, one of `taken`.
+            subject: The subject, one of `varied_subjects`.
             pose: The number of the pose, counted from 0.
 
         Returns:
@@ -244,7 +244,7 @@ class Plan(Shown, SamplingContext):
         return tuple(replace(block, subjects=self._taken(block.subjects)) for block in blocks)
 
     @cached_property
-    def taken(self) -> tuple[str, ...]:
+    def varied_subjects(self) -> tuple[str, ...]:
         """The subjects of pictures; with variations, each subject under each variation."""
         return self._taken(self.subjects)
 
@@ -264,7 +264,7 @@ class Plan(Shown, SamplingContext):
     def _with_variation(self, recipe: Recipe, variation: str) -> Self:
         """Return the plan of one variation; the two share all values that do not depend on the scene."""
         varied = replace(self, recipe=recipe, original=self, variation=variation)
-        known = {field.name for field in fields(self)} | {"scenes", "taken", "blocks", "rows", "_under"}
+        known = {field.name for field in fields(self)} | {"scenes", "varied_subjects", "blocks", "rows", "_under"}
         vars(varied).update({name: value for name, value in vars(self).items() if name not in known})
         return varied
 

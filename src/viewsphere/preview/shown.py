@@ -128,7 +128,7 @@ def _spread(planned: Plan, count: int) -> list[tuple[str, list[list[int]]]]:
     """Subjects and their poses, those of one time step together, such that subjects follow in order and poses step through
     the grid; all if there are no more.
     """
-    subjects, taken = planned.taken, planned.rows.taken
+    subjects, taken = planned.varied_subjects, planned.rows.positions_of
     if count >= planned.frames:
         return [(subject, [list(numbers(poses)) for poses in taken(subject)]) for subject in subjects]
     chosen: dict[str, list[int]] = {}

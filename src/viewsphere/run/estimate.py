@@ -90,7 +90,7 @@ def estimate(recipe: Recipe, workers: int = 1, clock: Callable[[], float] = time
 def extrapolate(planned: Plan, rates: Rates, workers: int) -> Estimate:
     """The cost of a whole plan; 0 workers count as one, because the calling process then does the work."""
     crew, models = max(workers, 1), sum(max(1, len(planned.steps_of(spec))) for spec in planned.kept_specs)
-    scenes = len(planned.taken)
+    scenes = len(planned.varied_subjects)
     scenes = planned.frames if planned.recipe.is_new_each_frame else max(scenes, min(crew, planned.shot_count))
     shared = models * rates.model + scenes * rates.scene + planned.frames * rates.frame
     seconds = shared / crew + planned.frames * rates.export
@@ -154,9 +154,9 @@ def _export(store: Store, formats: Sequence[FormatEntry], stopwatch: _Stopwatch)
 
 def _spread(planned: Plan) -> Iterator[Row]:
     """Some shots of subjects spread evenly over the plan; together they are spread evenly over the poses."""
-    count = min(SUBJECTS, len(planned.taken))
+    count = min(SUBJECTS, len(planned.varied_subjects))
     for i in range(count):
-        subject = planned.taken[i * (len(planned.taken) - 1) // max(count - 1, 1)]
+        subject = planned.varied_subjects[i * (len(planned.varied_subjects) - 1) // max(count - 1, 1)]
         shots = planned.rows.count_of(subject)
         parts = {int((i * SHOTS_OF_EACH + k + 1) * GOLDEN % 1 * shots) for k in range(SHOTS_OF_EACH)}
         yield from (planned.rows.row_of(subject, part) for part in sorted(parts))

@@ -179,7 +179,7 @@ class RenderUnits:
 
     def in_order(self) -> Iterator[Row]:
         """Yield all units, subject by subject."""
-        return chain.from_iterable(map(self._index.rows_of, self.plan.taken))
+        return chain.from_iterable(map(self._index.rows_of, self.plan.varied_subjects))
 
     def shuffled(self, epoch: int) -> Iterator[Row]:
         """Yield all units in an order that the recipe's seed and the epoch draw."""

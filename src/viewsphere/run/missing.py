@@ -39,7 +39,7 @@ class Missing:
         if self.portion.plan.recipe.scene.is_moved_each_frame:
             return sum(row.count for row in self._wanted())
         cast = self.portion.plan.cast
-        left = [name for name in self.portion.plan.taken if name not in self.skipped]
+        left = [name for name in self.portion.plan.varied_subjects if name not in self.skipped]
         whole = [name for name in left if not any(member.key in self.skipped for member in cast(name))]
         return sum(index.samples_of(name) for index in indices for name in whole)
 

@@ -103,8 +103,9 @@ class _Tally:
             )
         if self.smaller:
             have = "scene has" if len(self.smaller) == 1 else "scenes have"
+            scenes = len(self.portion.plan.varied_subjects)
             yield (
-                f"note: scenes.objects: {len(self.smaller):,} of {len(self.portion.plan.taken):,} {have} fewer objects than "
+                f"note: scenes.objects: {len(self.smaller):,} of {scenes:,} {have} fewer objects than "
                 f"drawn: after {limits.MAX_REDRAWS} draws not all fitted"
             )
 

@@ -59,7 +59,7 @@ def check_formats(planned: Plan, wanted: Iterable[FormatEntry], channels: Sequen
 def _check_labels(entry: FormatEntry, spec: FormatSpec, recipe: Recipe, channels: Sequence[str], sensor: Sensor) -> None:
     if sensor.lidar is not None and spec.lidar:
         return
-    kept = sensor.kept(tuple(channels))
+    kept = sensor.kept_channels(tuple(channels))
     lacking = missing(needs_of(spec, entry), {*kept, *recipe.annotations})
     absent = [name for name in lacking if not is_computed(name) or (sensor.lidar is not None and name in PASSES)]
     if absent:

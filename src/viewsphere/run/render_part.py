@@ -85,7 +85,7 @@ def _prepare_models(portion: DatasetPart, store: Store, pool: WorkerPool, keep_g
         tell(Progress("models", done, total))
     for key, problem in _distance_problems(portion, store, failed):
         failed.setdefault(key, problem)
-    own = {m.key for m in planned.model_specs} | set(planned.taken)
+    own = {m.key for m in planned.model_specs} | set(planned.varied_subjects)
     stops = [e for k, e in failed.items() if not (keep_going and k in own and isinstance(e, (ModelError, RecipeError)))]
     elsewhere = {} if portion.shard.is_all else store.skipped()
     if stops or (failed and own <= failed.keys() | elsewhere.keys()):

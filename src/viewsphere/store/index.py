@@ -149,7 +149,7 @@ class Index(Sequence[Row]):
         """Number of the samples of a subject."""
         return sum(self._samples_in(number, place, place + 1) for number, place in self._places.get(subject, ()))
 
-    def taken(self, subject: str) -> tuple[Ranges, ...]:
+    def positions_of(self, subject: str) -> tuple[Ranges, ...]:
         """The positions at which a subject is taken, block by block."""
         return tuple(self.blocks[number].positions for number, _ in self._places.get(subject, ()))
 

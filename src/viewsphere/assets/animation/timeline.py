@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from viewsphere.assets.animation.clip import Clip, Timeline
-from viewsphere.assets.cache import kept
+from viewsphere.assets.cache import cached_facts
 from viewsphere.assets.load import animated_reader, suffix_of
 from viewsphere.assets.paths.folder import ModelFolder
 from viewsphere.assets.paths.inside import split_source
@@ -38,7 +38,7 @@ class Blenders:
     def __exit__(self, *_: object) -> None:
         self._stack.close()
 
-    def told(self, path: Path, confined: bool, do: str, about: Mapping[str, Any]) -> dict[str, Any]:
+    def answer(self, path: Path, confined: bool, do: str, about: Mapping[str, Any]) -> dict[str, Any]:
         """The answer to a request about a file, cached or from Blender; raises a one-line ModelError if Blender has no
         answer.
         """
@@ -51,7 +51,7 @@ class Blenders:
             answer = self._asked(folder, do, about)
             return answer, [*folder.files, *map(Path, answer["files"])]
 
-        return kept(file, f"{do} {confined} {sorted(about.items())}", ask)
+        return cached_facts(file, f"{do} {confined} {sorted(about.items())}", ask)
 
     def timeline(self, path: Path, confined: bool, clip: str | None = None, fps: float | None = None) -> Timeline:
         """The file's timeline while the animation `clip` plays, by default the first one, at `fps` frames per second, by
@@ -60,7 +60,7 @@ class Blenders:
         file = split_source(path)[0]
         if animated_reader(file).timeline is not None:
             return _timeline_apart(file, confined, clip, fps)
-        return _timeline_of(self.told(path, confined, "timeline", {"clip": clip, "fps": fps}))
+        return _timeline_of(self.answer(path, confined, "timeline", {"clip": clip, "fps": fps}))
 
     def _asked(self, folder: ModelFolder, do: str, about: Mapping[str, Any]) -> dict[str, Any]:
         place = folder.model.parent.resolve(), folder.confined
@@ -84,7 +84,7 @@ def _timeline_of(told: Mapping[str, Any]) -> Timeline:
 def _timeline_apart(file: Path, confined: bool, clip: str | None = None, fps: float | None = None) -> Timeline:
     """The timeline that a file's own reader reads."""
     about = f"timeline apart {confined} {clip} {fps}"
-    return _timeline_of(kept(file, about, lambda: timeline_apart(file, confined, clip, fps)))
+    return _timeline_of(cached_facts(file, about, lambda: timeline_apart(file, confined, clip, fps)))
 
 
 def animation_of(path: Path, confined: bool) -> Timeline | None:

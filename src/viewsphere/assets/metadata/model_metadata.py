@@ -17,7 +17,7 @@ from viewsphere.assets.metadata.surface import Surface
 from viewsphere.assets.metadata.symmetries import find, lacking
 from viewsphere.assets.primitive import FileFacts
 from viewsphere.caches.arrays import Content
-from viewsphere.caches.entries import kept
+from viewsphere.caches.entries import cached
 from viewsphere.errors import ModelError
 from viewsphere.geometry.diameter import diameter
 from viewsphere.model.annotations.keypoints import Keypoints, Place
@@ -81,7 +81,7 @@ def found_symmetries(mesh: Mesh) -> Symmetries:
     digest = hashlib.sha256(readers_digest().encode())
     for array in (mesh.vertices, mesh.triangles):
         digest.update(repr(array.shape).encode() + array.tobytes())
-    return kept(
+    return cached(
         "models",
         digest.hexdigest(),
         lambda: find(Surface.from_mesh(mesh)),

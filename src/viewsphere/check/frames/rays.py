@@ -161,7 +161,7 @@ class RayCaster:
         floor = None if shot is None else shot.scene.floor
         ground = None if shot is None else shot.scene.ground
         self._has_ground = ground is not None and ground.is_labelled
-        instant = 0 if shot is None else self._scenery.taken(sample, shot)[0]
+        instant = 0 if shot is None else self._scenery.position(sample, shot)[0]
         behind = [thing for thing in (piece.still_at(instant) for piece in scenery.things) if thing.is_there]
         key = [(o.key, o.world_from_object.tobytes()) for o in sample.objects], behind, scenery, floor
         if key == self._key:

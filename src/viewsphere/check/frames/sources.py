@@ -54,7 +54,7 @@ class Sources:
         if spec is None:
             return
         try:
-            self._models.made(spec, self._recomputed.replanned.steps_of(key), None)
+            self._models.record_and_export(spec, self._recomputed.replanned.steps_of(key), None)
         except UserError as error:
             if str(error) != reason:
                 yield f"model {key}: expected it left out because of {str(error)!r:.200}, found {reason!r:.200}"
@@ -69,7 +69,7 @@ class Sources:
         planned_credit = planned.portion(number).plan.credits.get(info.key)
         credit = info.credit if self._may_be_renewed or planned_credit is None else planned_credit
         try:
-            made, export = self._models.made(spec, planned.steps_of(info.key), credit)
+            made, export = self._models.record_and_export(spec, planned.steps_of(info.key), credit)
         except UserError as error:
             self.why_not[info.key] = str(error)
             return

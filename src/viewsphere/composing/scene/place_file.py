@@ -112,7 +112,7 @@ def offers_of(spec: ModelSpec) -> FileOffers:
 @lru_cache(maxsize=16)
 def _offers_of(text: str, state: tuple[int, int]) -> FileOffers:
     """The offers for a specification as JSON and the state of its file."""
-    from viewsphere.assets.cache import kept, load  # which loads readers of models
+    from viewsphere.assets.cache import cached_facts, load  # which loads readers of models
 
     spec = ModelSpec.model_validate_json(text)
 
@@ -122,7 +122,7 @@ def _offers_of(text: str, state: tuple[int, int]) -> FileOffers:
 
     settings = spec.model_dump_json(include={"up", "forward", "unit", "confined"})
     path, inside = split_source(Path(spec.source))
-    return _offers(path.name, kept(path, f"place {json.dumps(inside)} {settings}", ask))
+    return _offers(path.name, cached_facts(path, f"place {json.dumps(inside)} {settings}", ask))
 
 
 def levels_and_lanes(mesh: Mesh, facts: FileFacts) -> list[dict[str, Any]]:

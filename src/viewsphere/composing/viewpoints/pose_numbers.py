@@ -53,7 +53,7 @@ def follows_from_recipe(views: Poses) -> bool:
     return not isinstance(plain, ListedPoses | TimedPoses) and not plain.digest
 
 
-def kept(names: Names) -> str:
+def joined_digests(names: Names) -> str:
     """Digests as stored in a part's `pose_names`."""
     return b64encode(names.tobytes()).decode()
 

@@ -147,7 +147,7 @@ class RepeatedPoses(Poses):
     base: Poses
 
     @abstractmethod
-    def taken(self, index: int) -> int:
+    def base_number(self, index: int) -> int:
         """The number of the base pose."""
 
     def drawn_for(self, name: str) -> Self:
@@ -157,19 +157,19 @@ class RepeatedPoses(Poses):
 
     def target(self, index: int) -> Vector | None:
         """The base pose's target."""
-        return self.base.target(self.taken(index))
+        return self.base.target(self.base_number(index))
 
     def place(self, index: int) -> str:
         """The base pose's name without its time."""
-        return self.base.place(self.taken(index))
+        return self.base.place(self.base_number(index))
 
     def view(self, index: int) -> Orbit:
         """The base pose's orbit."""
-        return self.base.view(self.taken(index))
+        return self.base.view(self.base_number(index))
 
     def fill(self, index: int) -> float | None:
         """The base pose's filled share."""
-        return self.base.fill(self.taken(index))
+        return self.base.fill(self.base_number(index))
 
     @property
     def intrinsics(self) -> Intrinsics | None:
@@ -178,7 +178,7 @@ class RepeatedPoses(Poses):
 
     def lens(self, index: int) -> Intrinsics | None:
         """The base pose's own lens."""
-        return self.base.lens(self.taken(index))
+        return self.base.lens(self.base_number(index))
 
     @property
     def lowest_elevation(self) -> float:

@@ -33,7 +33,7 @@ class SequencePoses(RepeatedPoses):
         """The counts of the poses, then the number of instants."""
         return {**self.base.counts, "instants": self.instants}
 
-    def taken(self, index: int) -> int:
+    def base_number(self, index: int) -> int:
         """The number of the sequence's pose, which is the number of the sequence within its subject."""
         return index // self.instants
 
@@ -42,7 +42,7 @@ class SequencePoses(RepeatedPoses):
         return f"{self.place(index)} at instant {index % self.instants}"
 
     def _pose(self, index: int) -> Viewpoint:
-        return self.base[self.taken(index)].model_copy(update={"index": index})
+        return self.base[self.base_number(index)].model_copy(update={"index": index})
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewsphere.caches.arrays import Arrays, Content, number_type
-from viewsphere.caches.entries import kept
+from viewsphere.caches.entries import cached
 from viewsphere.kernels.build import HOST
 from viewsphere.kernels.digests import package_digest
 
@@ -27,7 +27,7 @@ PACKAGES = ("engines", "rendering", "materials", "geometry", "kernels")
 
 def kept_light(content: Iterable[Any], make: Callable[[], T], types: tuple[type, ...]) -> T:
     """The result of `make`, from the cache if it has the result for equal content. `types`: those of the result's records."""
-    return kept("light", digest_of(content), make, pack_records, lambda held: unpack_records(held, types))
+    return cached("light", digest_of(content), make, pack_records, lambda held: unpack_records(held, types))
 
 
 def digest_of(content: Iterable[Any]) -> str:

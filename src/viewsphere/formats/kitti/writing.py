@@ -82,7 +82,7 @@ class Kitti(Tree):
         imported and merged data sets, the rig is a single camera. Raises UserError for any other sensor then.
         """
         if sample.origin is not None or sample.sensor != CAMERA:
-            shot, _, place = self._timeline.taken(sample)
+            shot, _, place = self._timeline.position(sample)
             return shot.rig, car_in(shot, "kitti"), place
         return None if sample.known_camera is None else Rig.single(sample.known_camera.intrinsics), Car(0), 0
 

@@ -91,7 +91,7 @@ class NuScenes(Tree):
         """Yield the files and records of a sensor's sample. The first sensor of an instant also adds the records of the whole
         instant.
         """
-        course, (shot, instant, place) = self._timeline.course(sample), self._timeline.taken(sample)
+        course, (shot, instant, place) = self._timeline.course(sample), self._timeline.position(sample)
         start, story = sample.index - place, self._story(course)
         view, channel = View(sample, shot, instant, place, course, story), channels_of(shot.rig)[place]
         if self._kinds.get(channel) != view.modality:

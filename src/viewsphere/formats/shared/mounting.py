@@ -41,7 +41,7 @@ def centred(matrix: Float) -> Float:
 def pointless(scope: Scope) -> Iterator[str]:
     """Reasons to refuse, for a format of points: LiDARs that store none."""
     for sensor in scope.rig.sensors if scope.rig else ():
-        if sensor.lidar is not None and LIDAR not in sensor.kept(scope.channels):
+        if sensor.lidar is not None and LIDAR not in sensor.kept_channels(scope.channels):
             yield f"expected channel {LIDAR} of every LiDAR; found none of {sensor.name}"
 
 

@@ -186,7 +186,7 @@ class Surreal(Tree):
 
     def _background(self, sample: Sample) -> str:
         """The name of the picture behind a sample's scene, without its folder; empty if there is none."""
-        shot, instant, _ = self._timeline.taken(sample)
+        shot, instant, _ = self._timeline.position(sample)
         finish = shot.instants[instant].finish or shot.scene.finish
         return PurePath(finish.background.image or "").name
 

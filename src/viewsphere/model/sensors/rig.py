@@ -33,7 +33,7 @@ class Sensor(OmitNone):
     channels: tuple[str, ...] | None = None
     lidar: Lidar | None = None
 
-    def kept(self, channels: tuple[str, ...]) -> tuple[str, ...]:
+    def kept_channels(self, channels: tuple[str, ...]) -> tuple[str, ...]:
         """Return the channels of a shot that the sensor keeps, in the shot's order."""
         own = self.channels
         if own is None:

@@ -172,7 +172,7 @@ def _instant(context: SamplingContext, own: SequenceState, subject: str, pose: i
 
 def _needed(context: SamplingContext, taken: Set[int]) -> set[int]:
     """The further instants that the labels of the taken ones need."""
-    names = {name for sensor in context.rig.sensors for name in sensor.kept(context.recipe.channels)}
+    names = {name for sensor in context.rig.sensors for name in sensor.kept_channels(context.recipe.channels)}
     names.update(context.recipe.annotations)
     known = (label for name in names if (label := label_named(name)))
     offsets = {offset for label in known for offset in (*label.view_offsets, *label.pose_offsets)}

@@ -12,7 +12,7 @@ from itertools import count, islice
 from pathlib import Path
 from typing import Any
 
-from viewsphere.composing.viewpoints.pose_numbers import kept, names_of
+from viewsphere.composing.viewpoints.pose_numbers import joined_digests, names_of
 from viewsphere.errors import StoreError, UserError
 from viewsphere.labels import (
     IdKind,
@@ -266,7 +266,7 @@ def _parts(source: _Source) -> Iterator[Part]:
     An unfinished part has no digest to look it up by, since no recipe renders its remainder. All poses come with the first
     part.
     """
-    plan, first, names = source.dataset.plan, source.first_frame, kept(names_of(source.dataset.plan))
+    plan, first, names = source.dataset.plan, source.first_frame, joined_digests(names_of(source.dataset.plan))
     for number, part in enumerate(plan.parts):
         rows = [row for row in source.rows if row.part == number]
         frames = sum(row.count for row in rows)

@@ -136,7 +136,7 @@ class RayPool:
         for worker in self._pool:
             worker.ask()
         for worker in _ready([worker for worker in self._pool if worker.asked is not None], "asked"):
-            key, frames = worker.told()
+            key, frames = worker.answer()
             if worker.job is not None and worker.job.key == key:
                 self._begun[key] = frames
         there = _nodes()
@@ -225,7 +225,7 @@ class _Worker:
         if self.job is not None and self.asked is None:
             self.asked = self.actor.begun.remote()
 
-    def told(self) -> tuple[str, int]:
+    def answer(self) -> tuple[str, int]:
         """Return the worker's answer: the key of a job, and the number of its finished frames."""
         ref, self.asked = self.asked, None
         try:

@@ -128,6 +128,6 @@ def _pointless(spec: FormatSpec, entry: FormatEntry, scope: Scope) -> Iterator[s
     """Yield the reason why a format of pictures cannot hold a LiDAR's frames, which are not pictures."""
     needed = [name for name in needs_of(spec, entry) if name in PASSES]
     for sensor in scope.rig.sensors if scope.rig else ():
-        lacking = missing(needed, sensor.kept(scope.channels))
+        lacking = missing(needed, sensor.kept_channels(scope.channels))
         if sensor.lidar is not None and lacking:
             yield f"expected channel {lacking[0]} of every sensor; found none of the LiDAR {sensor.name}"

@@ -106,7 +106,7 @@ class Models:
                 "give the recipe's entry a name"
             )
 
-    def made(self, spec: ModelSpec, steps: Iterable[TimeStep], credit: Credit | None) -> tuple[ModelInfo, Export]:
+    def record_and_export(self, spec: ModelSpec, steps: Iterable[TimeStep], credit: Credit | None) -> tuple[ModelInfo, Export]:
         """The record of a model at these time steps, made from its source, and the function that writes its files. Raises
         ModelError for an unusable file.
         """

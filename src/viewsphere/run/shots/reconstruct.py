@@ -124,7 +124,7 @@ class ViewReconstructor:
         """The geometry that a sample shows; None if scenery has changed."""
         there = {o.id: o for o in sample.objects}
         objects = tuple(self._thing(there.get(thing.id), thing) for thing in shot.objects)
-        instant, _ = self._scenery.taken(sample, shot)
+        instant, _ = self._scenery.position(sample, shot)
         behind = tuple(thing.still_at(instant) for thing in around.things)
         ground = shot.scene.ground is not None and shot.scene.ground.is_labelled
         now = objects, behind, ground, shot.label_alpha, shot.scene.floor
@@ -155,7 +155,7 @@ class ViewReconstructor:
             self._keys = keys  # before the views are made, which request meshes
             self._views = known, self._shot_views(shot, around)
         self._keys.update(keys)
-        views, (instant, sensor) = self._views[1], self._scenery.taken(sample, shot)
+        views, (instant, sensor) = self._views[1], self._scenery.position(sample, shot)
         if views and requires(needs, FollowedPoints):
             views.followed(sensor)
         return views and views.neighbours(instant, sensor)

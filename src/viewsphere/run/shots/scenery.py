@@ -36,7 +36,7 @@ class Scenery:
         """Key of the shot that contains a frame."""
         return self.dataset.plan.row_at(frame).key
 
-    def taken(self, sample: Sample, shot: Shot) -> tuple[int, int]:
+    def position(self, sample: Sample, shot: Shot) -> tuple[int, int]:
         """The instant and the sensor of a sample, both counted from 0 in its shot."""
         place = sample.index - self.dataset.plan.row_at(sample.index).first
         _, instant, sensor = next(islice(shot.samples, place, None))

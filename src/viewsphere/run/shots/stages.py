@@ -15,7 +15,7 @@ from viewsphere.assets.appearance.repaint import repaint_stamps
 from viewsphere.assets.cache import frame_of, load, read_ahead
 from viewsphere.assets.mesh import Mesh
 from viewsphere.assets.metadata.model_metadata import metadata_of, with_body_parts
-from viewsphere.assets.parts import taken
+from viewsphere.assets.parts import selected_parts
 from viewsphere.assets.primitive import FileFacts
 from viewsphere.errors import ModelError
 from viewsphere.geometry.box3d import Box3d
@@ -98,7 +98,7 @@ class Stages:
             mesh, self._facts[_name(spec, step)] = load(spec, step=step)
             return with_body_parts(mesh, spec)
         frame = frame_of(spec, step)
-        return taken(self.model(spec.whole, None if frame is None else TimeStep(frame=frame)), spec, step)
+        return selected_parts(self.model(spec.whole, None if frame is None else TimeStep(frame=frame)), spec, step)
 
     def box(self, spec: ModelSpec, step: TimeStep | None = None) -> Float:
         """The 3D box (8, 3) of the normalised model at a time step in its own axes; raises ModelError as `model` does."""
@@ -194,7 +194,7 @@ def render_sample(
     and a function that returns its model's metadata.
     """
     shot, (number, instant, sensor) = views.shot, sample
-    kept = shot.kept(sensor)
+    kept = shot.kept_channels(sensor)
     names = [name for name in kept if name not in PASSES]
     _arrange(views, instant, sensor, [*names, *shot.annotations])
     view, geometry = views.view(instant, sensor), stage.at(instant)

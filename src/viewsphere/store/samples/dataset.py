@@ -448,7 +448,7 @@ class Dataset(Shown, Sequence[Sample]):
                 files: dict[str, str] = record["files"] | supplied
                 whole = from_whole_sample(record, _ChannelFiles(self.root, files, self._manifests), files)
                 return self._named(_with_options(whole, options))
-            kept, number = records.shot.kept(place), f"{record['index']:08d}"
+            kept, number = records.shot.kept_channels(place), f"{record['index']:08d}"
             files = {name: head + number + tail for name, head, tail in records.files if name in kept}
             files |= {name: file for name, file in supplied.items() if records.shot.keeps(place, name)}
             short = records.shot.sample(place, record, _ChannelFiles(self.root, files, self._manifests), files)

@@ -90,7 +90,7 @@ def _in_shot(shot: Shot | None, places: Sequence[int], start: int, is_shown: IsS
     samples_of_shot = list(shot.samples)
     for number, place in enumerate(places, start):
         _, instant, sensor = samples_of_shot[place]
-        if is_shown(shot.kept(sensor)):
+        if is_shown(shot.kept_channels(sensor)):
             now = shot.instants[instant]
             yield shot.sequence, now.index, shot.rig.sensors[sensor].name, number, now.seconds
 

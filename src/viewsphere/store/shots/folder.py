@@ -364,7 +364,9 @@ class Store:
         prefix = target.relative_to(self.root).as_posix()
         records: list[dict[str, Any]] = []
         kinds, table = kinds or Files(), channels()
-        channels_of_sensor = {} if shot is None else {sensor.name: sensor.kept(shot.channels) for sensor in shot.rig.sensors}
+        channels_of_sensor = (
+            {} if shot is None else {sensor.name: sensor.kept_channels(shot.channels) for sensor in shot.rig.sensors}
+        )
         with self.scratch_folder(target, again) as folder, ShotFiles(folder, kinds, painter) as put:
             for sample in samples:
                 files: dict[str, str] = {}

@@ -169,9 +169,9 @@ class ShotRecords:
     def _makers(self) -> Makers:
         return Makers(makers(), labels_of(self.shot.annotations), self.shot.annotations, self.where)
 
-    def kept(self, place: int) -> tuple[str, ...]:
+    def kept_channels(self, place: int) -> tuple[str, ...]:
         """The shot's channels that the sample at a place, counted from 0, has."""
-        return self.shot.kept(self._samples[place][2])
+        return self.shot.kept_channels(self._samples[place][2])
 
     def keeps(self, place: int, channel: str) -> bool:
         """Return whether the sample's sensor keeps a channel, which may have been added later."""

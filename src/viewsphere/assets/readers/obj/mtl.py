@@ -51,7 +51,7 @@ class _Map:
     strength: float = 1.0
 
     @classmethod
-    def made(cls, file: str, options: dict[str, list[str]]) -> _Map:
+    def from_options(cls, file: str, options: dict[str, list[str]]) -> _Map:
         """The map of a file with these options."""
         return cls(
             file,
@@ -231,7 +231,7 @@ class _Builder:
         if not self.folder.finder.holds(file, self.library):
             file, behind = _without_options(file)
             options |= behind
-        return _Map.made(file.strip('"'), options) if file.strip('"') else None
+        return _Map.from_options(file.strip('"'), options) if file.strip('"') else None
 
     def image(self, source: _Map | None) -> int | None:
         return None if source is None else self.folder.image(source.file, source.file, base=self.library)

@@ -83,7 +83,7 @@ def _piece(polygons: Polygons, cut: Int) -> Primitive:
     is_split = polygons.corner_uv is not None or polygons.face_colors is not None
     at = polygons.corners if is_split else slice(None)
 
-    def taken(values: Float | None) -> Float | None:
+    def selected(values: Float | None) -> Float | None:
         return None if values is None else values[at]
 
     faces = polygons.face_colors
@@ -92,9 +92,9 @@ def _piece(polygons: Polygons, cut: Int) -> Primitive:
         material=0,
         positions=polygons.positions[at],
         triangles=cut if is_split else polygons.corners[cut],
-        normals=taken(polygons.normals),
-        uv0=taken(polygons.uv) if polygons.corner_uv is None else polygons.corner_uv,
-        colors=taken(polygons.colors) if faces is None else np.repeat(faces, polygons.counts, axis=0),
+        normals=selected(polygons.normals),
+        uv0=selected(polygons.uv) if polygons.corner_uv is None else polygons.corner_uv,
+        colors=selected(polygons.colors) if faces is None else np.repeat(faces, polygons.counts, axis=0),
     )
 
 

@@ -11,7 +11,7 @@ import bpy
 import numpy as np
 
 from ..rendering.compositing import fault
-from .evaluated import LEFT_OUT, STRANDS, listed, part_of, strands, taken
+from .evaluated import LEFT_OUT, STRANDS, has_seen_triangles, listed, part_of, strands
 from .opening import is_within, open_file
 from .playing import go_to
 from .reading import evaluate, prepare
@@ -91,7 +91,7 @@ class _Seeing:
                 self.lamps += 1
             elif item.type in LEFT_OUT:
                 self._left_out.setdefault(LEFT_OUT[item.type], []).append(item.name)
-            elif taken(instance, item) and _has_area(item, instance.matrix_world):
+            elif has_seen_triangles(instance, item) and _has_area(item, instance.matrix_world):
                 self.parts.setdefault(owner.name, {})[part_of(item, owner)] = None
                 showing.add(owner.name)
 

@@ -51,7 +51,7 @@ class Gathering:
                 left_out.setdefault(STRANDS, []).append(item.name)
             if item.type in LEFT_OUT:
                 left_out.setdefault(LEFT_OUT[item.type], []).append(item.name)
-            elif taken(instance, item):
+            elif has_seen_triangles(instance, item):
                 self._place(instance, item, owner)
             elif item.type in SOLID:
                 skipped.append(item.name)
@@ -157,7 +157,7 @@ class Gathering:
         return str(file)
 
 
-def taken(instance, item):
+def has_seen_triangles(instance, item):
     """Return whether the camera can see this instance's triangles: it is shown, has faces, and is no shadow catcher or
     holdout.
     """

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from viewsphere.caches.arrays import Content
-from viewsphere.caches.entries import kept
+from viewsphere.caches.entries import cached
 from viewsphere.composing.physics import LONGEST_S, Board, Body, Touch, World, body_of, needed
 from viewsphere.composing.placing import Draws, Footprint, Room, Shape, Way, draws_of
 from viewsphere.errors import RecipeError
@@ -335,7 +335,7 @@ def _convex_parts(shape: Shape) -> list[Float]:
         return [shape.hull]
     vertices, triangles = shape.surface()
     digest = hashlib.sha256(json.dumps(SETTINGS).encode() + vertices.tobytes() + triangles.tobytes()).hexdigest()
-    return kept("parts", digest, lambda: _parted(vertices, triangles), _plain, lambda content: list(content.arrays.values()))
+    return cached("parts", digest, lambda: _parted(vertices, triangles), _plain, lambda content: list(content.arrays.values()))
 
 
 def _plain(parts: list[Float]) -> Content:

@@ -34,7 +34,7 @@ def read_cameras(path: Path, entry: PoseList, zooms: bool = False) -> PoseFile:
             frames = _frames(path, entry, blenders)
             about = {"camera": entry.camera, "frames": frames, "at": entry.at, "size": entry.size}
             about |= {"clip": entry.clip, "fps": entry.fps}
-            told = blenders.told(path, entry.confined, "cameras", about)["cameras"]
+            told = blenders.answer(path, entry.confined, "cameras", about)["cameras"]
         except ModelError as error:
             raise RecipeError(f"viewpoints: {error}") from None
     lenses = tuple(_lens(one["lens"]) for one in told)

@@ -71,7 +71,7 @@ class Timeline:
         """The shot of a sample; None for a picture that is imported or from a merged data set."""
         return None if sample.origin is None else self._labelled(sample.origin.key)
 
-    def taken(self, sample: Sample) -> tuple[Shot, int, int]:
+    def position(self, sample: Sample) -> tuple[Shot, int, int]:
         """The shot of a sample, with the sample's instant and sensor in it. Raises UserError if the shot is unknown."""
         shot = self.shot(sample)
         if shot is None or sample.origin is None:
