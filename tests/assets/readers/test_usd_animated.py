@@ -46,7 +46,7 @@ MOVES = {
 @pytest.fixture(autouse=True)
 def _no_blender(monkeypatch, tmp_path):
     scratch_cache(monkeypatch, tmp_path / "cache")
-    monkeypatch.setattr(Blenders, "told", lambda *_: pytest.fail("Blender was asked"))
+    monkeypatch.setattr(Blenders, "answer", lambda *_: pytest.fail("Blender was asked"))
 
 
 @pytest.mark.parametrize("named", MOVES.values(), ids=MOVES)
