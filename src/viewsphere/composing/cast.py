@@ -48,13 +48,13 @@ def balanced(
     ones.
     """
     had = dict.fromkeys(models, 0)
-    found: dict[str, tuple[tuple[str, int], ...]] = {}
+    members: dict[str, tuple[tuple[str, int], ...]] = {}
     for scene, size in sizes.items():
-        own, order = Counter[str](), sorted(models, key=lambda name: share(seed, "category", scene, name))
+        counts, order = Counter[str](), sorted(models, key=lambda name: share(seed, "category", scene, name))
         for _ in range(size):
-            free = [name for name in order if repeat or own[name] < models[name]]
-            least = min(free, key=lambda name: (had[name], own[name]))
+            free = [name for name in order if repeat or counts[name] < models[name]]
+            least = min(free, key=lambda name: (had[name], counts[name]))
             had[least] += 1
-            own[least] += 1
-        found[scene] = tuple(own.items())
-    return found
+            counts[least] += 1
+        members[scene] = tuple(counts.items())
+    return members

@@ -358,7 +358,7 @@ def compose(
                 f"scene.company.count: expected at most {len(found) - 1}, as there are {len(found)} models{of}; "
                 f"found {entry.number}: add models, or ask for less company"
             )
-    made = Composition(
+    composition = Composition(
         recipe,
         subjects,
         {spec.key: tuple(members[split]) for spec, split in zip(specs, splits, strict=True)},
@@ -368,7 +368,7 @@ def compose(
     )
     if place is not None:
         place_pieces(recipe, place, draw_names(place.draw, subjects[0], ""), lambda category, labels: 1)
-    return made
+    return composition
 
 
 @lru_cache(maxsize=4)
@@ -427,6 +427,6 @@ def _blend(recipe: Recipe, numbering: Numbering) -> BlendScenery | None:
 
     moments = views.moments if isinstance(views, TimedPoses) and entry.frames is not None else ()
     seconds = {moment.frame: moment.seconds for moment in moments if moment is not None}
-    made = BlendScenery(recipe, entry, numbering, dict(sorted(seconds.items())))
-    made.check()
-    return made
+    scenery = BlendScenery(recipe, entry, numbering, dict(sorted(seconds.items())))
+    scenery.check()
+    return scenery

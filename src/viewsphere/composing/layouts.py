@@ -173,9 +173,9 @@ def shape(spec: ModelSpec, box_of: BoxOf) -> Shape:
 def _placer(layout: Layout, field: str) -> tuple[PlacerSpec, tuple[Any, ...]]:
     """The placer, and its options, if it has any."""
     name, given, where = placer_of(layout), options_of(layout), f"{field}.layout"
-    known = plugins.names("placers")
-    if name not in known:
-        raise RecipeError(f"{where}{'.kind' if given else ''}: {one_of(name, known)}")
+    placers = plugins.names("placers")
+    if name not in placers:
+        raise RecipeError(f"{where}{'.kind' if given else ''}: {one_of(name, placers)}")
     spec = plugins.load(PlacerSpec, name)
     return spec, spec.read_options(name, given, where)
 

@@ -44,14 +44,14 @@ def share(seed: int, *names: str) -> float:
 
 def shares(seed: int, *names: str, each: Iterable[str]) -> list[float]:
     """`share(seed, *names, name)` for each name; the common names are hashed once."""
-    begun, found = hashlib.blake2b(digest_size=8), list[float]()
+    begun, numbers = hashlib.blake2b(digest_size=8), list[float]()
     for name in (str(seed), *names):
         begun.update(_told(name))
     for name in each:
         hasher = begun.copy()
         hasher.update(_told(name))
-        found.append(_share(hasher.digest()))
-    return found
+        numbers.append(_share(hasher.digest()))
+    return numbers
 
 
 def _share(digest: bytes) -> float:

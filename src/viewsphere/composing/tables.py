@@ -20,14 +20,14 @@ def table_rows(path: Path, columns: Sequence[str]) -> Iterator[tuple[str, Cells]
     """
     rows = csv.DictReader(StringIO(_text(path, columns), newline=""), skipinitialspace=True)
     try:
-        found = [name.strip().lower() for name in rows.fieldnames or ()]
-        rows.fieldnames = found
-        if not set(columns) <= set(found):
-            raise RecipeError(f"{path}:1: expected columns {', '.join(columns)}; found {known_columns(columns, found)}")
+        headers = [name.strip().lower() for name in rows.fieldnames or ()]
+        rows.fieldnames = headers
+        if not set(columns) <= set(headers):
+            raise RecipeError(f"{path}:1: expected columns {', '.join(columns)}; found {known_columns(columns, headers)}")
         for row in rows:
             if None in row:
                 raise RecipeError(
-                    f"{path}:{rows.line_num}: expected {len(found)} cells, as the first line has; found more: put text that "
+                    f"{path}:{rows.line_num}: expected {len(headers)} cells, as the first line has; found more: put text that "
                     'holds a comma in "quotes"'
                 )
             yield f"{path}:{rows.line_num}", row

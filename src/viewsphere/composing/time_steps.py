@@ -278,13 +278,13 @@ class Schedule:
 
     def chunks(self, most: int) -> tuple[tuple[int, int], ...]:
         """Poses [first, stop) of each shot, at most `most` each: sizes within a time step differ by one at most."""
-        found: list[tuple[int, int]] = []
+        ranges: list[tuple[int, int]] = []
         for run in self.runs:
             count = run.stop - run.first
             parts = -(-count // most)
             edges = [run.first + i * count // parts for i in range(parts + 1)]
-            found += pairwise(edges)
-        return tuple(found)
+            ranges += pairwise(edges)
+        return tuple(ranges)
 
     def _number(self, pose: int) -> int:
         number = self._order[bisect_right(self._firsts, pose) - 1]

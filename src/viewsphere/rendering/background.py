@@ -127,13 +127,13 @@ class _Shelf:
 
     def picture(self, wanted: _Wanted) -> Image:
         """The picture, upright, RGB; raises RecipeError when it cannot be read."""
-        found = self._pictures.pop(wanted, None) or _decoded(wanted)
-        self._pictures[wanted] = found  # the most recently used is dropped last
+        decoded = self._pictures.pop(wanted, None) or _decoded(wanted)
+        self._pictures[wanted] = decoded  # the most recently used is dropped last
         held = sum(4 * p.width * p.height for p in self._pictures.values())
         while held > KEPT_BYTES and len(self._pictures) > 1:
             first = self._pictures.pop(next(iter(self._pictures)))
             held -= 4 * first.width * first.height
-        return found
+        return decoded
 
 
 @cache

@@ -24,7 +24,7 @@ def finished(radiance: Float32, background: Float32 | None, finish: Finish, seen
         pixels = develop(radiance, background, finish.view, alpha)
     else:
         picture = to_display_linear(radiance, background, finish.view, alpha)
-        known = seen()
-        picture = smooth_border(picture, known.targets, finish.smoother)
-        pixels = to_bytes(apply_effects(picture, effects, known))
+        surfaces = seen()
+        picture = smooth_border(picture, surfaces.targets, finish.smoother)
+        pixels = to_bytes(apply_effects(picture, effects, surfaces))
     return jpeg(pixels, effects.jpeg)

@@ -311,13 +311,13 @@ class NeighbourViews:
         known = {offset: shot.instant_after(self.instant, offset) for offset in (-1, 1)}
         around = {offset: (shot.instants[at].seconds, poses[at]) for offset, at in known.items() if at is not None}
         here = shot.instants[self.instant].seconds
-        found = {offset: (time - here, pose) for offset, (time, pose) in around.items() if pose is not None}
-        if not found:
+        near_poses = {offset: (time - here, pose) for offset, (time, pose) in around.items() if pose is not None}
+        if not near_poses:
             return np.tile(np.array(now), (len(moments), 1, 1))
-        for missing in {-1, 1} - found.keys():
-            time, pose = found[-missing]
-            found[missing] = -time, beyond(now, pose)
-        (before, first), (after, last) = found[-1], found[1]
+        for missing in {-1, 1} - near_poses.keys():
+            time, pose = near_poses[-missing]
+            near_poses[missing] = -time, beyond(now, pose)
+        (before, first), (after, last) = near_poses[-1], near_poses[1]
         path = Sweep(moments=(before, 0.0, after), motion=Motion(poses=(first, now, last)))
         return np.stack([np.array(path.pose(moment)) for moment in moments.tolist()])
 

@@ -99,9 +99,9 @@ def _pile(cast: Sequence[ModelSpec], shapes: Sequence[Shape], slots: tuple[int, 
     world = World(bodies, [IDENTITY] * len(slots), (), typical)
     for number in range(TRIES):
         own = rng("pile try", str(number), *(cast[slot].key for slot in slots), str(slots[0]))
-        made = _tried(world, shapes, slots, own)
-        if best is None or made.standing > best.standing:
-            best = made
+        pile = _tried(world, shapes, slots, own)
+        if best is None or pile.standing > best.standing:
+            best = pile
         if best.standing == len(slots):
             break
     assert best is not None

@@ -180,15 +180,15 @@ def _steps(lanes: Sequence[Lane], reach: float) -> Float:
     """The straight parts of lanes near the middle, cut to a metre at most: start x and y, length, direction, half the width,
     height.
     """
-    found: list[tuple[float, ...]] = []
+    steps: list[tuple[float, ...]] = []
     for x0, y0, z, x1, y1, width in (part for lane in lanes for part in stretches(lane)):
         length = math.hypot(x1 - x0, y1 - y0)
         parts = max(1, math.ceil(length))
         for i in range(parts if length else 0):
             x, y = x0 + (x1 - x0) * i / parts, y0 + (y1 - y0) * i / parts
             if max(abs(x), abs(y)) <= reach:
-                found.append((x, y, length / parts, (x1 - x0) / length, (y1 - y0) / length, width / 2, z))
-    return np.array(found).reshape(-1, 7)
+                steps.append((x, y, length / parts, (x1 - x0) / length, (y1 - y0) / length, width / 2, z))
+    return np.array(steps).reshape(-1, 7)
 
 
 PLACER = PlacerSpec(options=Options, place=place)

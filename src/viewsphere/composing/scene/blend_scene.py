@@ -83,12 +83,12 @@ class BlendScenery(Sendable):
     def warnings(self) -> tuple[str, ...]:
         """The warnings about the file."""
         dark = f"{self.path.name}: no light and no world; lit by the default sun and sky"
-        said = [f"scene.blend: {line}" for line in (*self.file.warnings, *([] if self.file.is_lit else [dark]))]
+        lines = [f"scene.blend: {line}" for line in (*self.file.warnings, *([] if self.file.is_lit else [dark]))]
         seen = {name for one in self.labelled for name in (one.root.name, *one.members)}
         for i, rule in enumerate(self.entry.labels):
             if not any(_fits(rule, one) and one.name in seen for one in self.file.objects):
-                said.append(f"scene.blend.labels[{i}]: what it fits is nothing that a render shows")
-        return tuple(said)
+                lines.append(f"scene.blend.labels[{i}]: what it fits is nothing that a render shows")
+        return tuple(lines)
 
     @cached_property
     def digest(self) -> str:
@@ -129,13 +129,13 @@ class BlendScenery(Sendable):
     @cached_property
     def groups(self) -> Mapping[str, tuple[tuple[str, ...], ...]]:
         """The members of each group of variants, by name: an object and its children."""
-        found: dict[str, tuple[tuple[str, ...], ...]] = {}
+        members: dict[str, tuple[tuple[str, ...], ...]] = {}
         for name, entry in self.entry.variants.items():
             roots = [one for one in self.file.objects if fnmatchcase(one.name, entry.one_of)]
             inside = {one.name for one in roots}
             tops = [one for one in roots if not any(a.name in inside for a in self.file.ancestors(one))]
-            found[name] = tuple((top.name, *self._below(top)) for top in tops)
-        return found
+            members[name] = tuple((top.name, *self._below(top)) for top in tops)
+        return members
 
     def _below(self, top: SceneObject) -> Iterator[str]:
         return (one.name for one in self.file.objects if top in self.file.ancestors(one))

@@ -178,15 +178,15 @@ class Scenes:
             entry, rng_of = self.recipe.scene, self._rng_of(names)
             sun, above = drawn(entry.sun, rng_of, ("sun",)), drawn(entry.sky, rng_of, ("sky",))
             sky = self._sky(above, names)
-            made = Scene(
+            drawn_scene = Scene(
                 sun=_moon(above.night, sun) if isinstance(above, NightSky) else _sun(sun, sky),
                 sky=sky.model_copy(update={"strength": 0.0}) if isinstance(sky, Daylight) and is_night(sun) else sky,
                 lights=_lights(entry.lights, rng_of),
                 ground=self._ground(drawn(entry.ground, rng_of, ("ground",)), rng_of),
                 finish=self._finish(names_of_finish, ()) if names_of_finish else Finish(),
             )
-            outdoors = weathered(made, entry, rng_of, partial(self._weather_seed, names))
-            return through_windows(made, outdoors) if self._is_indoors else outdoors
+            outdoors = weathered(drawn_scene, entry, rng_of, partial(self._weather_seed, names))
+            return through_windows(drawn_scene, outdoors) if self._is_indoors else outdoors
 
         return scene
 
@@ -209,9 +209,9 @@ class Scenes:
             return None if entry == "off" else Ground(catcher=entry == "catcher")
         files = {name: self.pictures["image", path][0] for name in pictures_of(Ground) if (path := getattr(entry, name))}
         if entry.material is not None:
-            made = _substance(entry.material, 1024, rng_of, ("ground",))
-            tile = materials.metres(made.name, made.seed)
-            return concrete(entry, material=made, tile=tile, color=entry.color or WHITE)
+            substance = _substance(entry.material, 1024, rng_of, ("ground",))
+            tile = materials.metres(substance.name, substance.seed)
+            return concrete(entry, material=substance, tile=tile, color=entry.color or WHITE)
         ground: Ground = concrete(entry, **files)
         return ground if entry.color or not entry.image else ground.model_copy(update={"color": WHITE})
 

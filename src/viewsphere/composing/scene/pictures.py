@@ -88,14 +88,14 @@ def _files(recipe: Recipe, field: str, kind: Kind, written: str) -> tuple[str, .
     if kind == "image":
         raise RecipeError(f"{field}: expected an image file; found none at {path}")
     suffixes = SKY_SUFFIXES if kind == "hdri" else IMAGE_SUFFIXES
-    found = tuple(named(Path(file), field).as_posix() for file in files_in(path, suffixes))
+    paths = tuple(named(Path(file), field).as_posix() for file in files_in(path, suffixes))
     if kind == "textures":
-        _check_folder(path, found, field)
+        _check_folder(path, paths, field)
     hint = nearest(written, ("daylight",)) if kind == "hdri" else ""
-    if not found:
+    if not paths:
         what = "a folder with images" if kind != "hdri" else "daylight, a file or a folder with files"
         raise RecipeError(f"{field}: expected {what} ({', '.join(suffixes)}); found {_none_in(path)}{hint}")
-    return found
+    return paths
 
 
 def _check_folder(folder: Path, found: tuple[str, ...], field: str) -> None:

@@ -130,16 +130,16 @@ def levels_and_lanes(mesh: Mesh, facts: FileFacts) -> list[dict[str, Any]]:
     The entries are in the mesh's axes.
     """
     said = {mark.part: mark for mark in facts.marks if mark.part}
-    found = [_lane(mark, facts) for mark in facts.marks if not mark.part]
+    offers = [_lane(mark, facts) for mark in facts.marks if not mark.part]
     for number, part in enumerate(mesh.parts):
         name = part.rpartition("/")[2]
         mark = said.get(part) or Annotation(kind_of(name), name)
         if mark.kind in (FLOOR, SURFACE):
             corners = np.unique(mesh.triangles[mesh.triangle_part == number])
-            found += _level(mark, mesh.vertices[corners].astype(np.float64), part in said)
+            offers += _level(mark, mesh.vertices[corners].astype(np.float64), part in said)
         elif part in said:
-            found.append({"kind": mark.kind, "name": mark.name, "problem": mark.problem})
-    return found
+            offers.append({"kind": mark.kind, "name": mark.name, "problem": mark.problem})
+    return offers
 
 
 def _lane(mark: Annotation, facts: FileFacts) -> dict[str, Any]:

@@ -106,10 +106,10 @@ def _moving(entry: PlaceEntry, pieces: tuple[SceneryPiece, ...]) -> tuple[Scener
     motions = entry.motion or {}
     for pattern in motions:
         if not any(fnmatchcase(piece.name, pattern) for piece in pieces):
-            known = sorted({piece.name.rstrip("0123456789") + "*" for piece in pieces})
+            patterns = sorted({piece.name.rstrip("0123456789") + "*" for piece in pieces})
             raise RecipeError(
-                f"scene.place.motion: expected patterns of its pieces' names, such as {', '.join(known)}; found {pattern!r}"
-                f"{nearest(pattern, known)}"
+                f"scene.place.motion: expected patterns of its pieces' names, such as {', '.join(patterns)}; found {pattern!r}"
+                f"{nearest(pattern, patterns)}"
             )
     return tuple(_with_motion(piece, motions) for piece in pieces)
 
@@ -281,7 +281,7 @@ def scenery_key(name: str, rest: str) -> str:
 
 def plane_images(recipe: Recipe) -> tuple[tuple[str, ...], ...]:
     """Absolute paths of the pictures of each entry of planes, sorted; raises RecipeError if there are none."""
-    found: list[tuple[str, ...]] = []
+    images: list[tuple[str, ...]] = []
     for i, entry in enumerate(recipe.scene.planes):
         if entry.image is not None:
             path = recipe.folder / Path(entry.image).expanduser()
@@ -294,8 +294,8 @@ def plane_images(recipe: Recipe) -> tuple[tuple[str, ...], ...]:
             problem = f"scene.planes[{i}].images: expected a folder with images ({endings}); found none in {folder}"
         if not files:
             raise RecipeError(problem)
-        found.append(files)
-    return tuple(found)
+        images.append(files)
+    return tuple(images)
 
 
 def plane_spec(recipe: Recipe, entry: PlaneEntry, path: str, category_id: Naming) -> ModelSpec:

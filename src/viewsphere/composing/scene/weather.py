@@ -38,10 +38,10 @@ def weathered(scene: Scene, entry: SceneEntry, rng_of: RngOf, seed_of: SeedOf) -
     lights, changes = scene.lights, dict[str, Any]()
     light = floor_light(sun, sky)
     if isinstance(fog, FogEntry):
-        made: Fog = concrete(fog)
-        sun, sky, spread, light = in_fog(sun, sky, made)
+        drawn_fog: Fog = concrete(fog)
+        sun, sky, spread, light = in_fog(sun, sky, drawn_fog)
         lights = lights if spread is None else (*lights, spread)
-        changes["fog"] = made if fog.color else made.model_copy(update={"color": _triple(light)})
+        changes["fog"] = drawn_fog if fog.color else drawn_fog.model_copy(update={"color": _triple(light)})
     for one in falling:
         own: Any = concrete(one, color=one.color or _triple(light + _even(lights)), seed=seed_of("falling"))
         changes["rain" if isinstance(own, Rain) else "snow"] = own

@@ -65,15 +65,15 @@ class FileTrajectory:
         return tuple(self._orbited(place, world, instant) for instant, place in enumerate(places))
 
     def _stamps(self, fps: float) -> Float:
-        found = self.file.times
-        if found is None:
+        seconds = self.file.times
+        if seconds is None:
             return np.arange(len(self.file.entries)) / fps
-        for i, (a, b) in enumerate(pairwise(found), 1):
+        for i, (a, b) in enumerate(pairwise(seconds), 1):
             if b <= a:
                 raise RecipeError(
                     f"viewpoints.path: expected times that ascend; found {b:.6f} after {a:.6f} (pose {i} of {self.entry.path})"
                 )
-        return np.array(found) - found[0]
+        return np.array(seconds) - seconds[0]
 
     @cached_property
     def _motions(self) -> tuple[Float, tuple[tuple[float, ...], ...]]:
@@ -105,9 +105,9 @@ class FileTrajectory:
     @cached_property
     def _orbits(self) -> Float:
         """Azimuth, elevation, distance and tilt (N, 4) of all orbits; angles take the shorter way to the next orbit."""
-        found = np.array([tuple(one) for one in self.file.entries], np.float64)
-        found[:, (0, 3)] = np.unwrap(found[:, (0, 3)], axis=0, period=360.0)
-        return found
+        orbits = np.array([tuple(one) for one in self.file.entries], np.float64)
+        orbits[:, (0, 3)] = np.unwrap(orbits[:, (0, 3)], axis=0, period=360.0)
+        return orbits
 
 
 def _between(stamps: Float, seconds: float) -> Between:
@@ -127,10 +127,10 @@ def _mixed(values: Float, place: Between) -> Float:
 def trajectory(entry: PoseList, folder: Path) -> FileTrajectory:
     """The motion that an entry of a recipe means; for a 3D file's camera, at all of its frames unless the entry names some."""
     whole = entry if entry.frames is not None or not _is_3d(entry) else entry.model_copy(update={"frames": "all"})
-    found = pose_file(folder / Path(entry.path).expanduser(), whole, zooms=True)
-    if len({(lens.width, lens.height, lens.lens.parameters) for lens in found.lenses}) > 1:
+    poses = pose_file(folder / Path(entry.path).expanduser(), whole, zooms=True)
+    if len({(lens.width, lens.height, lens.lens.parameters) for lens in poses.lenses}) > 1:
         raise RecipeError("viewpoints.path: expected lenses of one size and distortion along a motion; found several")
-    return FileTrajectory(entry, found)
+    return FileTrajectory(entry, poses)
 
 
 def _is_3d(entry: PoseList) -> bool:

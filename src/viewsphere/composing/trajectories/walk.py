@@ -133,9 +133,9 @@ class Walk:
         stretches = tuple(self._stretches())
         begins = np.array([stretch.begin for stretch in stretches])
         places = np.maximum(np.searchsorted(begins, times, side="right") - 1, 0)
-        found = [stretches[i].offset_at(t, self.entry.speed) for i, t in zip(places.tolist(), times.tolist(), strict=True)]
-        places = np.array([(x, y, 0.0) for x, y, _ in found])
-        return places, np.array([(-math.sin(h), math.cos(h), 0.0) for *_, h in found])
+        offsets = [stretches[i].offset_at(t, self.entry.speed) for i, t in zip(places.tolist(), times.tolist(), strict=True)]
+        places = np.array([(x, y, 0.0) for x, y, _ in offsets])
+        return places, np.array([(-math.sin(h), math.cos(h), 0.0) for *_, h in offsets])
 
     def _stretches(self) -> Iterator[Stretch]:
         entry = self.entry

@@ -46,12 +46,12 @@ def parse_options(given: Mapping[str, JsonValue]) -> Options:
     """The options, checked. Raises RecipeError, whose message begins with the recipe's field, for an unknown name (with the
     nearest) or a value out of range.
     """
-    known = [f.name for f in fields(Options)]
+    names = [f.name for f in fields(Options)]
     for name in given:
         if name == "exposure":
             raise RecipeError("engine.exposure: expected it as scene.view.exposure, found it among the engine's options")
-        if name not in known:
-            raise RecipeError(f"engine.{name}: {one_of(name, known)}")
+        if name not in names:
+            raise RecipeError(f"engine.{name}: {one_of(name, names)}")
     default = Options()
     antialias = given.get("antialias", default.antialias)
     if isinstance(antialias, bool) or antialias not in ANTIALIAS:

@@ -87,11 +87,11 @@ class Shown:
     def mesh(self, thing: Thing, step: TimeStep, resting: Mesh) -> Mesh:
         """A thing's mesh at a time step, which shares equal data with the mesh at rest."""
         look = Look(thing.model, step, thing.repaints)
-        found = self._held.pop(look, None) or sharing(self._soaked(look.mesh(self.load)), resting)
-        self._held[look] = found  # the most recently used comes last
+        mesh_now = self._held.pop(look, None) or sharing(self._soaked(look.mesh(self.load)), resting)
+        self._held[look] = mesh_now  # the most recently used comes last
         if len(self._held) > STEPS:
             del self._held[next(iter(self._held))]
-        return found
+        return mesh_now
 
     def _soaked(self, mesh: Mesh) -> Mesh:
         return wetted(mesh, self.soaked, evenly=True) if self.soaked else mesh

@@ -55,10 +55,10 @@ def _lenses(thing: Thing, mesh: Mesh) -> list[Float]:
     """Return the places, in world metres, where light begins below a thing's lens; empty if it has no lens or is absent."""
     if LENS not in mesh.parts or not thing.is_there:
         return []
-    own = mesh.triangles[mesh.triangle_part == mesh.parts.index(LENS)]
-    if not len(own):
+    triangles = mesh.triangles[mesh.triangle_part == mesh.parts.index(LENS)]
+    if not len(triangles):
         return []
-    corners = transform(thing.world_from_object, mesh.vertices[np.unique(own)].astype(np.float64))
+    corners = transform(thing.world_from_object, mesh.vertices[np.unique(triangles)].astype(np.float64))
     x, y, _ = (corners.min(axis=0) + corners.max(axis=0)) / 2
     return [np.array([x, y, corners[:, 2].min() - BELOW])]
 

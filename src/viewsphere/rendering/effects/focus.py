@@ -109,7 +109,7 @@ def _one_sided(picture: Float32, signed: Float32, step: Mask) -> Float32:
         weight = np.where(like, np.float32(1 / ((down - 2) ** 2 + (across - 2) ** 2 + 1)), np.float32(0))
         total += weight
         colors += weight[:, None] * picture[v, u]
-    found = total > 0
+    is_covered = total > 0
     out = picture.copy()
-    out[y[found], x[found]] = colors[found] / total[found, None]
+    out[y[is_covered], x[is_covered]] = colors[is_covered] / total[is_covered, None]
     return out

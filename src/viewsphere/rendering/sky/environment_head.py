@@ -118,18 +118,18 @@ def _exr(path: Path) -> ExrHead:
     try:
         check_file(path, "MAX_PICTURE_BYTES")
         with silenced(), library.File(str(path), separate_channels=True, header_only=True) as file:
-            found = _colors(file)
-            if found is None:
+            colors = _colors(file)
+            if colors is None:
                 channels = ", ".join(sorted({name for part in file.parts for name in _names(part)}))
                 raise _unreadable(path, f"found channels {channels}; it needs R, G and B: export it with them")
-            low, high = file.parts[found[0]].header["dataWindow"]
+            low, high = file.parts[colors[0]].header["dataWindow"]
             width, height = (int(high[k]) - int(low[k]) + 1 for k in (0, 1))
     except (UnreadableError, MemoryError):
         raise
     except Exception:  # OpenEXR's parser raises errors of many kinds
         raise _unreadable(path, "found one whose head cannot be read: damaged or cut off; get or export it again") from None
     check_shape(path, width, height)
-    return ExrHead(*found, width, height)
+    return ExrHead(*colors, width, height)
 
 
 def _colors(file: Any) -> tuple[int, tuple[str, ...]] | None:
@@ -155,7 +155,7 @@ def _hdr(path: Path, start: bytes) -> HdrHead:
         raise _unreadable(path, "found a Radiance file without a picture's size: get or export it again")
     if b"32-bit_rle_xyze" in head[0]:
         raise _unreadable(path, "found colours in XYZ; convert it to RGB")
-    found = HdrHead(head[0], head[1], int(head[2]), head[3], int(head[4]))
-    width, height = (found.columns, found.rows) if found.is_upright else (found.rows, found.columns)
+    hdr_head = HdrHead(head[0], head[1], int(head[2]), head[3], int(head[4]))
+    width, height = (hdr_head.columns, hdr_head.rows) if hdr_head.is_upright else (hdr_head.rows, hdr_head.columns)
     check_shape(path, width, height)
-    return found
+    return hdr_head

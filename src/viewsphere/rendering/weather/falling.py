@@ -125,12 +125,12 @@ def _streaks(camera: Camera, before: Float, after: Float, wide: Float) -> tuple[
     depth = away if camera.lens.has_unit_rays else middle[:, 2]
     focal = math.sqrt(camera.intrinsics.fx * camera.intrinsics.fy)
     with np.errstate(divide="ignore", invalid="ignore"):
-        own = focal * wide / away
+        widths = focal * wide / away
         blur = focal * APERTURE * np.abs(1 / away - 1 / FOCUS)
-        width = np.maximum(np.hypot(own, blur), 1.0)
+        width = np.maximum(np.hypot(widths, blur), 1.0)
         length = np.linalg.norm(last - first, axis=1)
         area = math.pi / 4
-        level = np.minimum(area * own**2 / (area * width**2 + length * width), 1.0)
+        level = np.minimum(area * widths**2 / (area * width**2 + length * width), 1.0)
     ends = np.concatenate([first, last], axis=1)
     reach = width + 1
     x, y = ends[:, ::2], ends[:, 1::2]

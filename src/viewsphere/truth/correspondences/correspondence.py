@@ -199,9 +199,9 @@ def _own(seen: NDArray[np.int32], view: View, other: View) -> NDArray[np.int32]:
     shift = shifts(view, other)
     if not shift.any():
         return seen
-    own = np.empty(seen.shape, np.int32)
-    kernels.own_triangles(seen, view.owners, shift, own)
-    return own
+    triangles = np.empty(seen.shape, np.int32)
+    kernels.own_triangles(seen, view.owners, shift, triangles)
+    return triangles
 
 
 def pixel_centers(shape: tuple[int, ...]) -> Float:

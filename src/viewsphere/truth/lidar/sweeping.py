@@ -97,9 +97,9 @@ def _moved(geometry: Geometry, camera: Camera, turning: Turning, column: int) ->
 
     q, m = homogeneous(geometry, camera), np.column_stack((camera.R, camera.t))
     for i, motion in turning.moved.items():
-        own = slice(geometry.vertex_start[i], geometry.vertex_start[i + 1])
+        rows = slice(geometry.vertex_start[i], geometry.vertex_start[i + 1])
         placed = _transformed(motion[column], geometry.places(i))
-        kernels.transform(placed, 0, len(placed), m, q[own])
+        kernels.transform(placed, 0, len(placed), m, q[rows])
     return q
 
 

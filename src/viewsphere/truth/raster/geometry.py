@@ -140,19 +140,19 @@ class Geometry:
 
         if i == len(self.poses):
             return self.ground
-        own = self.coordinates[self.vertex_start[i] : self.vertex_start[i + 1]]
-        placed = np.empty(own.shape)
-        kernels.place(self.poses[i], own, placed)
+        coordinates = self.coordinates[self.vertex_start[i] : self.vertex_start[i + 1]]
+        placed = np.empty(coordinates.shape)
+        kernels.place(self.poses[i], coordinates, placed)
         return placed
 
     def corners(self, chosen: NDArray[np.integer]) -> NDArray[np.float64]:
         """World corners (n, 3, 3) of triangles (n,); arbitrary for triangle -1."""
         from viewsphere.truth.raster import kernels_place as kernels
 
-        found = np.empty((len(chosen), 3, 3))
+        filled = np.empty((len(chosen), 3, 3))
         starts = np.array([*self.vertex_start, len(self.coordinates)])
-        kernels.corners(chosen.astype(np.int64), self.triangles, self.coordinates, starts, self.poses, self.ground, found)
-        return found
+        kernels.corners(chosen.astype(np.int64), self.triangles, self.coordinates, starts, self.poses, self.ground, filled)
+        return filled
 
     @property
     def has_scenery(self) -> bool:
@@ -235,12 +235,12 @@ class Facing:
             return []
         moved = (shown.poses != geometry.poses).any(axis=(1, 2)).tolist()
         every = range(len(moved)) if things is None else things
-        found = [i for i in every if moved[i] or shown.meshes[i] is not geometry.meshes[i]]
-        shown.poses[found] = geometry.poses[found]
-        for i in found:
+        moved_things = [i for i in every if moved[i] or shown.meshes[i] is not geometry.meshes[i]]
+        shown.poses[moved_things] = geometry.poses[moved_things]
+        for i in moved_things:
             shown.meshes[i] = geometry.meshes[i]
         shown.all_of = geometry.poses if things is None else None
-        return found
+        return moved_things
 
 
 @dataclass(eq=False)
@@ -456,12 +456,12 @@ def _offset_triangles(parts: Sequence[NDArray[np.int32]], firsts: Sequence[int])
 
 def _are_used(meshes: Sequence[Mesh]) -> NDArray[np.bool_]:
     """A mask (V,) of the vertices of these meshes that are corners of a triangle; a repeated mesh is processed once."""
-    known: dict[int, NDArray[np.bool_]] = {}
+    used_vertices: dict[int, NDArray[np.bool_]] = {}
     for mesh in meshes:
-        if id(mesh) not in known:
-            known[id(mesh)] = np.zeros(len(mesh.vertices), np.bool_)
-            known[id(mesh)][mesh.triangles] = True
-    return np.concatenate([np.empty(0, np.bool_), *(known[id(mesh)] for mesh in meshes)])
+        if id(mesh) not in used_vertices:
+            used_vertices[id(mesh)] = np.zeros(len(mesh.vertices), np.bool_)
+            used_vertices[id(mesh)][mesh.triangles] = True
+    return np.concatenate([np.empty(0, np.bool_), *(used_vertices[id(mesh)] for mesh in meshes)])
 
 
 def _ground(bounds: NDArray[np.float64], floor: Floor | None) -> Geometry:

@@ -85,13 +85,13 @@ def states(placed: Sequence[Placed]) -> list[NDArray[np.uint8]]:
         raise ValueError("states: expected points of one view, got several views")
     xy = _joined([points.xy.reshape(-1, 2) for points in placed])
     near = _joined([points.near.reshape(-1) for points in placed])
-    own = _joined([points.own().reshape(-1) for points in placed])
+    own_triangles = _joined([points.own().reshape(-1) for points in placed])
     rays = None if view.is_pinhole else _joined([p.rays.reshape(-1, 3) for p in placed if p.rays is not None])
     state, cell = _classified(xy, near, (view.camera.width, view.camera.height))
-    for index, met in _meetings(view, xy, near, own, cell, rays):
+    for index, met in _meetings(view, xy, near, own_triangles, cell, rays):
         kernels.hide(met, index, np.uint8(OCCLUDED), state)
     if view.shown is not view.geometry:
-        state[(state == VISIBLE) & view.is_turned_away(own)] = OCCLUDED
+        state[(state == VISIBLE) & view.is_turned_away(own_triangles)] = OCCLUDED
     stops = np.cumsum([points.near.size for points in placed])[:-1]
     return [part.reshape(points.near.shape) for part, points in zip(np.split(state, stops), placed, strict=True)]
 

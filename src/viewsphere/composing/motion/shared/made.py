@@ -144,9 +144,9 @@ def _between(entry: MotionEntry, move: Move, generator_of: RngOf) -> Move:
 
 def _options(entry: MotionEntry, field: str) -> tuple[MotionSpec, Any]:
     """The motion of an entry's kind, and the entry's options in its class."""
-    known = plugins.names("motions")
-    if entry.kind not in known:
-        raise RecipeError(f"{field}.kind: {one_of(entry.kind, known)}")
+    motions = plugins.names("motions")
+    if entry.kind not in motions:
+        raise RecipeError(f"{field}.kind: {one_of(entry.kind, motions)}")
     spec = plugins.load(MotionSpec, entry.kind)
     return spec, read_options(spec.options, entry.options, field)
 

@@ -218,12 +218,12 @@ class Drop:
 
     def _lying(self, world: World, without: Sequence[int]) -> list[tuple[Float, float]]:
         """Balls around the things that are already there, world axes."""
-        found: list[tuple[Float, float]] = []
+        circles: list[tuple[Float, float]] = []
         for i, pose in enumerate(world.poses):
             if i not in without:
                 middle, radius = self._spheres(i)
-                found.append((transform(np.array(pose), middle), radius))
-        return found
+                circles.append((transform(np.array(pose), middle), radius))
+        return circles
 
     def _starts(
         self, number: str, slots: Sequence[int], places: Sequence[tuple[Float, float]], there: list[tuple[Float, float]]
@@ -250,13 +250,13 @@ class Drop:
         within = self.ground.within
         if within is None:
             return []
-        found: list[int] = []
+        beside: list[int] = []
         for i, pose in enumerate(world.poses):
             middle = transform(np.array(pose), self._spheres(i)[0])
             is_on = (np.abs((middle[:2] - within.center) @ within.axes.T) <= within.half).all()
             if not is_on or middle[2] < 0 or (height < math.inf and self._lowest(i, pose) > height):
-                found.append(i)
-        return found
+                beside.append(i)
+        return beside
 
     def _lowest(self, slot: int, pose: Matrix4) -> float:
         return float(transform(np.array(pose), self._bodies[slot].corners)[:, 2].min())
@@ -318,13 +318,13 @@ def _turned(middle: Float, at: tuple[float, float, float], turn: float) -> Matri
 def _fences(around: Footprint, height: float) -> list[Board]:
     """Four boards around a rectangle."""
     turn = math.atan2(around.axes[0, 1], around.axes[0, 0])
-    thick, found = float(around.half.max()), list[Board]()
+    thick, boards = float(around.half.max()), list[Board]()
     for axis, side in ((0, 1), (0, -1), (1, 1), (1, -1)):
         half = [float(h) + 2 * thick for h in around.half]
         half[axis] = thick
         x, y = (around.center + side * (around.half[axis] + thick) * around.axes[axis]).tolist()
-        found.append(Board((x, y, height / 2), (half[0], half[1], height / 2), turn, is_fence=True))
-    return found
+        boards.append(Board((x, y, height / 2), (half[0], half[1], height / 2), turn, is_fence=True))
+    return boards
 
 
 def _convex_parts(shape: Shape) -> list[Float]:

@@ -144,12 +144,12 @@ def first_crowded(prints: Sequence[Footprint], gap: float, start: int = 0) -> tu
     reach = math.sqrt(FAR) * (radius + gap / 2)
     order = np.argsort(along - reach, kind="stable")
     ends = np.searchsorted((along - reach)[order], (along + reach)[order], side="right")
-    found: list[tuple[int, int]] = []
+    pairs: list[tuple[int, int]] = []
     for place, (i, end) in enumerate(zip(order.tolist(), ends.tolist(), strict=True)):
         others = order[place + 1 : end]
         near = others[np.hypot(x[others] - x[i], y[others] - y[i]) <= reach[others] + reach[i]].tolist()
-        found += [(max(i, j), min(i, j)) for j in near if max(i, j) >= start and not prints[i].apart(prints[j], gap)]
-    return min(found, default=None)
+        pairs += [(max(i, j), min(i, j)) for j in near if max(i, j) >= start and not prints[i].apart(prints[j], gap)]
+    return min(pairs, default=None)
 
 
 def outline(points: Float, world_from_object: Matrix4) -> Outline:

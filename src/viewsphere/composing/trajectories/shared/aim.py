@@ -40,7 +40,7 @@ def focuses(entry: Moving, look: object, times: Float, world: World) -> list[Flo
 
 def aimed(centers: Float, ahead: Float, focus: Sequence[Float] | None, world: World) -> tuple[RigPose, ...]:
     """The level rig at positions (T, 3); it looks at one focus for each, or along directions (T, 3)."""
-    found: list[RigPose] = []
+    poses: list[RigPose] = []
     for instant, center in enumerate(centers):
         toward = ahead[instant] if focus is None else focus[instant] - center
         length = _norm(toward)
@@ -51,8 +51,8 @@ def aimed(centers: Float, ahead: Float, focus: Sequence[Float] | None, world: Wo
             )
         axes = facing(toward / length)
         point = on_axis(center, axes[:, 2], world) if focus is None else focus[instant]
-        found.append(posed(axes, center, point))
-    return tuple(found)
+        poses.append(posed(axes, center, point))
+    return tuple(poses)
 
 
 def facing(forward: Float) -> Float:

@@ -25,10 +25,10 @@ def read_poses(path: Path, kind: str = "auto", every: int = 1) -> PoseFile:
     RecipeError, with file and line, for an unreadable file or a file without poses.
     """
     kind = _kind(path) if kind == "auto" else kind
-    found = _read(path, kind)
-    if not found.entries:
+    poses = _read(path, kind)
+    if not poses.entries:
         raise RecipeError(f"{path}: expected at least one pose; found none")
-    return found.thinned(every)
+    return poses.thinned(every)
 
 
 def _kind(path: Path) -> str:

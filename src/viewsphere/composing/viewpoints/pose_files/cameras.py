@@ -34,11 +34,11 @@ def read_cameras(path: Path, entry: PoseList, zooms: bool = False) -> PoseFile:
             frames = _frames(path, entry, blenders)
             about = {"camera": entry.camera, "frames": frames, "at": entry.at, "size": entry.size}
             about |= {"clip": entry.clip, "fps": entry.fps}
-            told = blenders.answer(path, entry.confined, "cameras", about)["cameras"]
+            cameras = blenders.answer(path, entry.confined, "cameras", about)["cameras"]
         except ModelError as error:
             raise RecipeError(f"viewpoints: {error}") from None
-    lenses = tuple(_lens(one["lens"]) for one in told)
-    entries = tuple(_motion(one, str(path)) for one in told)
+    lenses = tuple(_lens(one["lens"]) for one in cameras)
+    entries = tuple(_motion(one, str(path)) for one in cameras)
     if zooms and len(set(lenses)) > 1:
         return PoseFile(entries, up="+z", lenses=lenses)
     return PoseFile(entries, up="+z", intrinsics=one_lens(lenses, str(path)))

@@ -50,11 +50,11 @@ def read_colmap(path: Path) -> PoseFile:
 
 
 def _camera_lines(file: Path) -> list[tuple[list[str], str]]:
-    found = [(words, f"{file}:{line}") for line, words in read_lines(file)]
-    for words, where in found:
+    lines = [(words, f"{file}:{line}") for line, words in read_lines(file)]
+    for words, where in lines:
         if len(words) < 5 or not words[0].isdigit():
             raise RecipeError(f"{where}: expected CAMERA_ID MODEL WIDTH HEIGHT PARAMS; found {len(words)} other words")
-    return found
+    return lines
 
 
 def _camera(words: Sequence[str], where: str) -> Intrinsics:

@@ -27,10 +27,10 @@ def read_shots(path: Path) -> PoseFile:
     A line without a lens is also an error where others have one.
     """
     try:
-        found = path.stat()
+        facts = path.stat()
     except OSError as error:
         raise RecipeError(f"{path}: expected a readable file of shots; found: {error.strerror or error}") from None
-    return _read(path, (found.st_mtime_ns, found.st_size))
+    return _read(path, (facts.st_mtime_ns, facts.st_size))
 
 
 @lru_cache(maxsize=1)

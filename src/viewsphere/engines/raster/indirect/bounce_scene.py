@@ -93,9 +93,9 @@ class BounceScenes:
             same = len(last.things) == len(things) and all(map(is_, last.things, things)) and all(map(is_, last.meshes, meshes))
             if same and last.lengths == lengths and last.triangles is surfaces.triangles:
                 return last
-        found = _thrown(still, (things, meshes), rows, only_indoors)
-        self._last[:] = [found]
-        return found
+        thrown = _thrown(still, (things, meshes), rows, only_indoors)
+        self._last[:] = [thrown]
+        return thrown
 
 
 def _thrown(still: list[int], own: tuple[tuple[Thing, ...], tuple[Mesh, ...]], rows: Rows, only_indoors: bool) -> _Throwing:

@@ -132,9 +132,9 @@ class BounceScene:
     @cached_property
     def owns(self) -> NDArray[np.bool_]:
         """A mask of the surfaces' triangles, (T,), true for the bounce scene's own."""
-        own = np.zeros(len(self.surfaces.material), np.bool_)
-        own[self.which] = True
-        return own
+        mask = np.zeros(len(self.surfaces.material), np.bool_)
+        mask[self.which] = True
+        return mask
 
 
 class _Seen(NamedTuple):

@@ -152,8 +152,8 @@ def join(inner: Volume, outer: Volume, known: Iterable[tuple[Float32, Float32]])
     """
     grid, shape = inner.grid, outer.grid.shape
     at = np.indices(tuple(grid.shape.tolist())).reshape(3, -1).T
-    own = np.clip(np.minimum(at, grid.shape - 1 - at).min(axis=1) / FADE, 0, 1).astype(np.float32)
-    border = np.flatnonzero((own < 1) & ~inner.buried)
+    weight = np.clip(np.minimum(at, grid.shape - 1 - at).min(axis=1) / FADE, 0, 1).astype(np.float32)
+    border = np.flatnonzero((weight < 1) & ~inner.buried)
     places = (grid.corner + at[border][:, ::-1] / grid.cells - outer.grid.corner) * outer.grid.cells
     first = np.clip(np.floor(places), 0, shape[::-1] - 2).astype(np.int64)
     cell = (first[:, 2] * shape[1] + first[:, 1]) * shape[2] + first[:, 0]
@@ -162,7 +162,7 @@ def join(inner: Volume, outer: Volume, known: Iterable[tuple[Float32, Float32]])
     probes = cell[:, None] + (steps[0] * shape[1] + steps[1]) * shape[2] + steps[2]
     for mine, around in known:
         total = sum(share[:, None] * around[probe] for share, probe in zip(shares.T, probes.T, strict=True))
-        mine[border] += (1 - own[border, None]) * (total - mine[border])
+        mine[border] += (1 - weight[border, None]) * (total - mine[border])
 
 
 def _shares(part: Float32, screens: Float32) -> Float32:

@@ -128,9 +128,9 @@ class Patches:
                 is_ground, True, *part,
             )  # fmt: skip
             answers[own], arrived[own] = part
-        found = np.zeros((self.count, kernels.HITS, 9), np.float32)
-        found[rows, columns] = np.concatenate([answers, arrived], axis=1)
-        mean = self._mean(found)
+        hits = np.zeros((self.count, kernels.HITS, 9), np.float32)
+        hits[rows, columns] = np.concatenate([answers, arrived], axis=1)
+        mean = self._mean(hits)
         return Lit(mean[:, :3], mean[:, 3:6], mean[:, 6:])
 
 

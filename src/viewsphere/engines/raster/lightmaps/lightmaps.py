@@ -83,14 +83,14 @@ def charts_of(corners: Float32, unit: float, rays: int) -> Charts | None:
     node.
     """
     places = corners.astype(np.float64)
-    found = [piece for chart in _planes(places, unit) for piece in _pieces(chart, places, unit)]
-    if not found:
+    charts = [piece for chart in _planes(places, unit) for piece in _pieces(chart, places, unit)]
+    if not charts:
         return None
-    boxes = np.array([_box(piece, places) for piece in found])
+    boxes = np.array([_box(piece, places) for piece in charts])
     cells = unit / CELL
-    while (size := _nodes(boxes, cells)[1].prod(axis=1)).sum() > max(MOST, 4 * len(found)):
+    while (size := _nodes(boxes, cells)[1].prod(axis=1)).sum() > max(MOST, 4 * len(charts)):
         cells *= 0.95
-    return _settled(found, *_nodes(boxes, cells), size, places, cells, rays)
+    return _settled(charts, *_nodes(boxes, cells), size, places, cells, rays)
 
 
 def _nodes(boxes: Float, cells: float) -> tuple[NDArray[np.int64], NDArray[np.int64]]:

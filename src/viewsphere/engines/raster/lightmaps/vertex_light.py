@@ -123,12 +123,12 @@ def vertex_light_of(
     across = np.cross(edges[:, 0], edges[:, 1])
     area = np.sqrt((across * across).sum(axis=1, dtype=np.float64)) / 2
     with np.errstate(invalid="ignore"):
-        own = np.flatnonzero((area > 0) & np.isfinite(area) & np.isfinite(normals[which]).all(axis=1))
-    if not len(own):
+        usable = np.flatnonzero((area > 0) & np.isfinite(area) & np.isfinite(normals[which]).all(axis=1))
+    if not len(usable):
         return None
-    which, corners, longest = which[own], corners[own], longest[own]
+    which, corners, longest = which[usable], corners[usable], longest[usable]
     facing = np.ascontiguousarray(normals[which])
-    size = max(CELL / unit, float(np.sqrt(2 * area[own].sum() / MOST)), float(np.ptp(corners, axis=(0, 1)).max()) / 500_000)
+    size = max(CELL / unit, float(np.sqrt(2 * area[usable].sum() / MOST)), float(np.ptp(corners, axis=(0, 1)).max()) / 500_000)
     grid = _Grid.from_corners(corners, facing, longest, size)
     facets = _facets(vertices, triangles, which, corners, facing, grid.parts)
     ways, met, far = look_near(tree, facets.places, facets.normals, NEAR * grid.cell, unit)

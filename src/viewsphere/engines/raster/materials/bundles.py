@@ -85,12 +85,12 @@ class _Content:
     def levels(self) -> Int32:
         """First word, width and height of each mip level, (L, 3)."""
         height, width = self.shape
-        found = [(0, width, height)]
-        while max(width, height) > 1 and len(found) < LEVELS:
-            first = found[-1][0] + width * height * 4 * len(self.kinds)
+        sizes = [(0, width, height)]
+        while max(width, height) > 1 and len(sizes) < LEVELS:
+            first = sizes[-1][0] + width * height * 4 * len(self.kinds)
             width, height = max(width // 2, 1), max(height // 2, 1)
-            found.append((first, width, height))
-        return np.array(found, np.int32)
+            sizes.append((first, width, height))
+        return np.array(sizes, np.int32)
 
     @property
     def words(self) -> int:
@@ -114,12 +114,12 @@ class BundlePacker:
                 continue
             image = images[texture.image]
             groups.setdefault((image.pixels.shape, replace(texture, image=0)), []).append((image, name))
-        found: list[int] = []
+        numbers: list[int] = []
         for (_, texture), uses in groups.items():
             base = [image for image, name in uses if name == "base_color_texture"]
             weighted = material.alpha_mode != "OPAQUE" and any(image.pixels[..., 3].min() < 255 for image in base)
-            found.append(self._slots.setdefault((_Content(tuple(uses), weighted), texture), len(self._slots)))
-        return found + [-1] * (MOST - len(found))
+            numbers.append(self._slots.setdefault((_Content(tuple(uses), weighted), texture), len(self._slots)))
+        return numbers + [-1] * (MOST - len(numbers))
 
     def pack(self) -> Textures:
         """Return the packed bundles. Do not write to the arrays: the next stage with the same textures shares them."""

@@ -41,12 +41,12 @@ def glass_of(rows: Rows) -> Glass:
     bends = surfaces.looks[:, L_BENDS] > 0
     if not bends.any():
         return NO_GLASS
-    own = np.flatnonzero(bends[surfaces.material])
-    if not len(own):
+    bending = np.flatnonzero(bends[surfaces.material])
+    if not len(bending):
         return NO_GLASS
-    things = np.searchsorted(rows.geometry.triangle_start, own, side="right") - 1
+    things = np.searchsorted(rows.geometry.triangle_start, bending, side="right") - 1
     rows.write(np.unique(things).tolist())
-    corners = surfaces.vertices[surfaces.triangles[own]]
+    corners = surfaces.vertices[surfaces.triangles[bending]]
     tree = tree_of(corners[..., 11:14])
     normals = corners[tree.order, :, :3].reshape(-1, 9)
-    return Glass(tree.bounds, tree.links, tree.corners, normals, surfaces.material[own[tree.order]])
+    return Glass(tree.bounds, tree.links, tree.corners, normals, surfaces.material[bending[tree.order]])

@@ -59,15 +59,15 @@ def mirrored(baked: Baked, camera: Camera, plane: float, left_out: NDArray[np.bo
     """Return the image of a mirror at the height `plane` in the pixels `at` (n,), without the triangles `left_out` (T,)."""
     below = _below(camera, plane)
     geometry, blended = (_without(geometry, left_out) for geometry in (baked.geometry, baked.blended))
-    own = replace(baked, geometry=geometry, blended=blended, is_fine=False)
-    found, view = rasterize(geometry, below), view_of(baked, below)
-    baked.rows.write_seen(below, found, geometry)
-    triangle, depth = np.full(found.triangle.size, -1, np.int32), np.zeros(found.triangle.size, np.float32)
-    triangle[at], depth[at] = found.triangle.reshape(-1)[at], found.inverse_depth.reshape(-1)[at]
+    mirror = replace(baked, geometry=geometry, blended=blended, is_fine=False)
+    visibility, view = rasterize(geometry, below), view_of(baked, below)
+    baked.rows.write_seen(below, visibility, geometry)
+    triangle, depth = np.full(visibility.triangle.size, -1, np.int32), np.zeros(visibility.triangle.size, np.float32)
+    triangle[at], depth[at] = visibility.triangle.reshape(-1)[at], visibility.inverse_depth.reshape(-1)[at]
     light = np.zeros((len(triangle), 4), np.float32)
-    shape = found.triangle.shape
+    shape = visibility.triangle.shape
     seen = Visibility(triangle.reshape(shape), depth.reshape(shape))
-    shade_all(own, below, view, seen, triangle, depth, light, NO_SPLIT)
+    shade_all(mirror, below, view, seen, triangle, depth, light, NO_SPLIT)
     sky = np.ones_like(light)
     sky[at] = 0  # read only here
     sky_behind(view, baked.surrounding, sky)

@@ -115,14 +115,14 @@ def _seen_in_lobes(
     toward, normals = facing
     taken = gloss[:, 3:6] / np.maximum(gloss[:, :3], np.float32(1e-6))
     for start in range(0, len(at), SOME // LOBE_RAYS):
-        own = slice(start, start + SOME // LOBE_RAYS)
-        ways, weights = lobe_rays(toward[own], normals[own], gloss[own, 6], at[own], int(view.columns), LOBE_RAYS)
-        sights = np.tile(gloss[own, 7:10], (LOBE_RAYS, 1)), ways.reshape(-1, 3), np.tile(width[own], LOBE_RAYS)
+        chunk = slice(start, start + SOME // LOBE_RAYS)
+        ways, weights = lobe_rays(toward[chunk], normals[chunk], gloss[chunk, 6], at[chunk], int(view.columns), LOBE_RAYS)
+        sights = np.tile(gloss[chunk, 7:10], (LOBE_RAYS, 1)), ways.reshape(-1, 3), np.tile(width[chunk], LOBE_RAYS)
         seen, is_known = _seen(baked, bounce_scene, tree, sights, float(view.pixel))
         total = weights.sum(axis=0)
-        each = np.where(is_known.reshape(*weights.shape, 1), seen.reshape(*weights.shape, 3), taken[own])
-        shown[own] = (weights[..., None] * each).sum(axis=0) / np.maximum(total, np.float32(1e-6))[:, None]
-        known[own] = total > 0
+        each = np.where(is_known.reshape(*weights.shape, 1), seen.reshape(*weights.shape, 3), taken[chunk])
+        shown[chunk] = (weights[..., None] * each).sum(axis=0) / np.maximum(total, np.float32(1e-6))[:, None]
+        known[chunk] = total > 0
     return shown, known
 
 

@@ -79,10 +79,12 @@ def _taken(
     triangle, depth = visibility.triangle.reshape(-1), visibility.inverse_depth.reshape(-1)
     is_thing = baked.kind[triangle[at]] != kernels_paint.FLOOR
     slots = at[is_thing].astype(np.int32)
-    own, light = np.empty((len(slots), 4), np.float32), (baked.surrounding, baked.occlusion, baked.bounces)
-    kernels_split.film(view_of(baked, camera), baked.surfaces, baked.textures, baked.floor, *light, slots, triangle, depth, own)
+    colors, light = np.empty((len(slots), 4), np.float32), (baked.surrounding, baked.occlusion, baked.bounces)
+    kernels_split.film(
+        view_of(baked, camera), baked.surfaces, baked.textures, baked.floor, *light, slots, triangle, depth, colors
+    )
     taken = share[:, None] * sky
-    share[is_thing], taken[is_thing] = own[:, 3], own[:, :3]
+    share[is_thing], taken[is_thing] = colors[:, 3], colors[:, :3]
     return share, taken
 
 

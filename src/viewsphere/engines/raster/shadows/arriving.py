@@ -19,7 +19,7 @@ def arriving(
 
     `width` is the distance between places: one number, or one for each (N,).
     """
-    found = np.empty((5, len(places)), np.float32)
+    light = np.empty((5, len(places)), np.float32)
     widths = np.full(len(places), width, np.float32)
-    arrive_on_ground(lights, which, np.ascontiguousarray(places.T, np.float32), widths, found)
-    return (found[1:4] * np.maximum(found[0], 0)).T, found[4]
+    arrive_on_ground(lights, which, np.ascontiguousarray(places.T, np.float32), widths, light)
+    return (light[1:4] * np.maximum(light[0], 0)).T, light[4]

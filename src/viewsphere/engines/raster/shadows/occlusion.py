@@ -285,11 +285,11 @@ def _seen(points: Float, views: Views, directions: Float32) -> Float32:
 
 def _spread(volume: Float32, known: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """Give unknown points beside known ones the mean of these, once; return a mask of the points that are then known."""
-    own = np.concatenate([volume, np.ones((*known.shape, 1), np.float32)], axis=-1)
-    own[~known] = 0
-    total = np.zeros_like(own)
+    weighted = np.concatenate([volume, np.ones((*known.shape, 1), np.float32)], axis=-1)
+    weighted[~known] = 0
+    total = np.zeros_like(weighted)
     for axis in range(3):
-        beside, here = np.moveaxis(own, axis, 0), np.moveaxis(total, axis, 0)
+        beside, here = np.moveaxis(weighted, axis, 0), np.moveaxis(total, axis, 0)
         here[1:] += beside[:-1]
         here[:-1] += beside[1:]
     fresh = ~known & (total[..., -1] > 0)
@@ -311,9 +311,9 @@ def _read_points(casters: Casters, corner: Float, cells: float, shape: NDArray[n
     triangles = casters.surfaces.triangles[: casters.extent.triangles].T
     vertices = casters.surfaces.vertices.T
     # Place and direction: lengths in cells.
-    known = np.concatenate([(vertices[11:14] - corner[:, None]) * cells, vertices[:3]], dtype=np.float32)
+    points = np.concatenate([(vertices[11:14] - corner[:, None]) * cells, vertices[:3]], dtype=np.float32)
     blocks = (triangles[:, start : start + _SIDES] for start in range(0, triangles.shape[1], _SIDES))
-    parts = np.concatenate([np.maximum(np.ceil(1.5 * _longest(known[:3], block)), 1) for block in blocks])
+    parts = np.concatenate([np.maximum(np.ceil(1.5 * _longest(points[:3], block)), 1) for block in blocks])
     if (parts * parts).sum(dtype=np.float64) > _MOST_MARKS:
         return np.ones(shape, np.bool_)
     is_first = np.zeros(shape, np.bool_)
@@ -321,14 +321,14 @@ def _read_points(casters: Casters, corner: Float, cells: float, shape: NDArray[n
     is_corner[triangles[:, parts == 1]] = True
     marked = np.flatnonzero(is_corner)
     for start in range(0, len(marked), _MOST_MARKED):
-        _mark(known[:, marked[start : start + _MOST_MARKED]], is_first)
+        _mark(points[:, marked[start : start + _MOST_MARKED]], is_first)
     for n in np.unique(parts[parts > 1]).astype(int).tolist():
         f, g = np.mgrid[: n + 1, : n + 1].reshape(2, -1)[:, :, None].astype(np.float32) / n
         f, g = f[f + g < 1 + 0.5 / n], g[f + g < 1 + 0.5 / n]
         whole = triangles[:, parts == n]
         step = max(_MOST_MARKED // len(f), 1)
         for start in range(0, whole.shape[1], step):
-            p, q, r = (known[:, None, corners[start : start + step]] for corners in whole)
+            p, q, r = (points[:, None, corners[start : start + step]] for corners in whole)
             _mark((p + f[:, None] * (q - p) + g[:, None] * (r - p)).reshape(6, -1), is_first)
     for axis in range(3):
         along = np.moveaxis(is_first, axis, 0)

@@ -79,9 +79,9 @@ class TargetShades:
 
     def _volume(self, hidden: Sequence[Hidden]) -> Float32:
         """The volumes of all of them, which are the same at most instants."""
-        own = tuple({id(each.volume): each.volume for each in hidden}.values())
-        if not (self._joined and len(own) == len(self._joined[0][0]) and all(map(is_, own, self._joined[0][0]))):
-            self._joined[:] = [(own, joined_volumes(own))]
+        volumes = tuple({id(each.volume): each.volume for each in hidden}.values())
+        if not (self._joined and len(volumes) == len(self._joined[0][0]) and all(map(is_, volumes, self._joined[0][0]))):
+            self._joined[:] = [(volumes, joined_volumes(volumes))]
         return self._joined[0][1]
 
     def _hidden(
@@ -146,12 +146,12 @@ def _alone(arranged: Arranged, i: int, casters: Casters, level: Float, unit: flo
     vertices = surfaces.vertices[geometry.vertex_start[i] : geometry.vertex_start[i + 1]].copy()
     vertices[:, :3] = transform(level, np.nan_to_num(mesh.normals))
     vertices[:, 11:14] = transform(level / unit, mesh.vertices)
-    own = slice(geometry.triangle_start[i], geometry.triangle_start[i + 1])
+    rows = slice(geometry.triangle_start[i], geometry.triangle_start[i + 1])
     placed = vertices[:, 11:14][np.unique(mesh.triangles)].astype(np.float64)
     low, high = placed.min(axis=0), placed.max(axis=0)
     extent = Extent(low, high, float(low[2]) if stands else None, len(mesh.triangles), float(np.abs(placed).max()))
-    triangles, normals = mesh.triangles.astype(np.uint32), surfaces.normals[own]
-    part = surfaces._replace(vertices=vertices, triangles=triangles, material=surfaces.material[own], normals=normals)
+    triangles, normals = mesh.triangles.astype(np.uint32), surfaces.normals[rows]
+    part = surfaces._replace(vertices=vertices, triangles=triangles, material=surfaces.material[rows], normals=normals)
     return Casters(part, casters.textures, extent)
 
 

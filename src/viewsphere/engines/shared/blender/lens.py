@@ -71,14 +71,14 @@ def views_of(camera: Camera) -> tuple[PinholeView, ...]:
     if camera.lens.is_linear and camera.intrinsics.skew == 0:
         return (PinholeView(camera),)
     rays = pixel_rays(camera.intrinsics).reshape(-1, 3)
-    known = np.flatnonzero(np.isfinite(rays).all(axis=1))
-    ahead = rays[known]
+    seen_pixels = np.flatnonzero(np.isfinite(rays).all(axis=1))
+    ahead = rays[seen_pixels]
     if (ahead[:, 2] > 0).all() and (np.abs(ahead[:, :2]).max(axis=1) <= STEEPEST * ahead[:, 2]).all():
-        return (_view(camera, np.eye(3), known, ahead),)
+        return (_view(camera, np.eye(3), seen_pixels, ahead),)
     turned = [ahead @ np.array(face, float).T for face in FACES]
     nearest = np.argmax([t[:, 2] for t in turned], axis=0)
     views = [
-        _view(camera, np.array(face, float), known[nearest == i], turned[i][nearest == i])
+        _view(camera, np.array(face, float), seen_pixels[nearest == i], turned[i][nearest == i])
         for i, face in enumerate(FACES)
         if (nearest == i).any()
     ]

@@ -112,10 +112,10 @@ def options_of(renderer: str, given: Mapping[str, JsonValue]) -> AnyOptions:
 
 def _parsed(given: Mapping[str, JsonValue], presets: Mapping[str, _Own]) -> _Own:
     default = presets["good"]
-    known = [*(f.name for f in fields(default)), "quality"]
+    names = [*(f.name for f in fields(default)), "quality"]
     for name in given:
-        if name not in known:
-            raise RecipeError(f"engine.{name}: {one_of(name, known)}")
+        if name not in names:
+            raise RecipeError(f"engine.{name}: {one_of(name, names)}")
     quality = given.get("quality", "good")
     if not isinstance(quality, str) or quality not in presets:
         raise RecipeError(f"engine.quality: expected {_listed(list(presets))}, found {quality!r}")

@@ -102,11 +102,11 @@ def members_of(shot: Shot) -> dict[str, int]:
 
 def kinds_of(things: Sequence[Thing], meshes: Sequence[Mesh], scene: Scene) -> tuple[Kind, ...]:
     """The models that are put into the scene, each with its changes to materials."""
-    found: dict[tuple[int, tuple[Repaint, ...], bool], tuple[Mesh, list[Thing]]] = {}
+    kinds: dict[tuple[int, tuple[Repaint, ...], bool], tuple[Mesh, list[Thing]]] = {}
     for i in staged(things, scene):
         thing, mesh = things[i], meshes[i]
-        found.setdefault((id(mesh), thing.repaints, thing.model.faces is None), (mesh, []))[1].append(thing)
-    return tuple(Kind(mesh, repaints, both, tuple(own)) for (_, repaints, both), (mesh, own) in found.items())
+        kinds.setdefault((id(mesh), thing.repaints, thing.model.faces is None), (mesh, []))[1].append(thing)
+    return tuple(Kind(mesh, repaints, both, tuple(own)) for (_, repaints, both), (mesh, own) in kinds.items())
 
 
 def materials_request(kinds: Sequence[Kind], put: Put, levels: Sequence[Levels] | None) -> list[Request]:

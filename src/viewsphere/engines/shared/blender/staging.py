@@ -393,10 +393,10 @@ def clip_of(visibility: Visibility, geometry: Geometry, camera: Camera) -> Clip:
     """Clipping range, in metres, of all visible surfaces; the ground is included up to its corners, where Blender's ground
     ends.
     """
-    known = visibility.inverse_depth[visibility.inverse_depth > 0]
-    if not len(known):
+    inverse_depths = visibility.inverse_depth[visibility.inverse_depth > 0]
+    if not len(inverse_depths):
         return NEAREST, 1 / NEAREST
-    near, far = 1 / (SPARE * float(known.max())), SPARE / float(known.min())
+    near, far = 1 / (SPARE * float(inverse_depths.max())), SPARE / float(inverse_depths.min())
     if geometry.ground_z is None:
         return near, far
     corners = geometry.ground

@@ -146,12 +146,12 @@ def look(
     ways, frame = (charts.directions, charts.turn), (charts.local, charts.axes)
     nodes = Spots.from_rays(tree, charts.origins, ways, frame, normals, charts.cell, is_inside_out)
     nodes.counted[~charts.reached] = 0
-    found = vertex_light_of(
+    vertex_light = vertex_light_of(
         tree, vertices, triangles, np.flatnonzero(charts.chart < 0), normals, unit, SITE_RAYS * more, is_inside_out
     )
-    if found is None:
+    if vertex_light is None:
         return Look(charts, nodes, None)
-    sites, facets = found
+    sites, facets = vertex_light
     ways, frame = (sites.directions, np.arange(len(sites.origins), dtype=np.int32)), (sites.local, sites.axes)
     return Look(
         charts,

@@ -45,15 +45,15 @@ def with_near(
     near[:, 0] = 1
     turned = domes(RAYS, TILE * TILE).astype(np.float32)
     for start in range(0, len(slots), SOME):
-        own = slots[start : start + SOME]
-        places, rays = _seen_at(view, own, depth)
-        normals = bounce_scene.surfaces.normals[triangle[own]]
+        chunk = slots[start : start + SOME]
+        places, rays = _seen_at(view, chunk, depth)
+        normals = bounce_scene.surfaces.normals[triangle[chunk]]
         normals = np.where((normals * rays).sum(axis=1, keepdims=True) < 0, normals, -normals)
-        ways = np.matmul(turned[_turn(view, own)], axes_along(normals))
+        ways = np.matmul(turned[_turn(view, chunk)], axes_along(normals))
         origins = (places + normals * np.float32(OFF / bounce_scene.unit)).astype(np.float32)
-        each = np.arange(len(own), dtype=np.int32)
+        each = np.arange(len(chunk), dtype=np.int32)
         met, far = cast(tree, origins, ways, each, REACH / float(bounces.frame[0, 3]))
-        kernels.gather(met, far, origins, ways, bounce_scene.which, bounce_scene.surfaces.normals, bounces.sent, own, near)
+        kernels.gather(met, far, origins, ways, bounce_scene.which, bounce_scene.surfaces.normals, bounces.sent, chunk, near)
     return bounces._replace(near=near)
 
 
