@@ -97,7 +97,7 @@ def read_arrays(file: Path) -> Content:
 
 
 def _head(about: Any, blocks: Arrays) -> bytes:
-    """The head, behind its length."""
+    """The head of the entry, preceded by its length."""
     places: dict[str, list[Any]] = {}
     at = 0
     for name, values in blocks.items():

@@ -34,7 +34,7 @@ from viewsphere.store import Category
 from viewsphere.validation.errors import Nearest
 
 LONGEST_KEY = 150
-"""Bytes; names of files and of folders that are being written add up to some hundred more."""
+"""Longest key in bytes: names of files, and of folders during writing, add about a hundred bytes to it, and may have 255."""
 
 COLUMNS = ("name", "width", "height", "length")
 Sizes = Mapping[str, tuple[float, float, float]]

@@ -141,7 +141,7 @@ def _spread(planned: Plan, count: int) -> list[tuple[str, list[list[int]]]]:
 
 
 def _grouped(steps: Sequence[Ranges], places: Sequence[int]) -> list[list[int]]:
-    """The poses at some places of all time steps' poses, parted where the time step changes."""
+    """The poses at some positions in the poses of all time steps, one list for each time step."""
     edges = list(accumulate(map(length, steps), initial=0))
     groups: list[tuple[int, int]] = []
     for place in places:

@@ -71,7 +71,8 @@ SUDDENLY = 1e6
 """
 
 MAP, MAP_RAYS, BEYOND = 96, 128, 0.9
-"""Cells of the ground's map in each direction, rays of each cell, and the map's margin around all things, in heights of these.
+"""Cells of the ground's map in each direction, rays of each cell, and the map's margin around all things, as a multiple of
+their height.
 """
 
 SHADOWS = 2e-3
