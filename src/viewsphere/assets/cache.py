@@ -78,7 +78,7 @@ def load(
     if named is not None:
         built = _built(spec, named)
         if isinstance(built, Path):
-            return load(in_file(spec, built), folder, step)
+            return load(_in_file(spec, built), folder, step)
         raw, facts = built, _facts(spec, named, built)
         return normalise(raw, facts, spec), placed(raw, facts, spec)
     path, inside = split_source(Path(spec.source))
@@ -115,7 +115,7 @@ def read_ahead(spec: ModelSpec, frames: Iterable[int], folder: Path | None = Non
     named = source_of(spec.source)
     if named is not None:
         built = _built(spec, named)
-        spec = in_file(spec, built) if isinstance(built, Path) else spec
+        spec = _in_file(spec, built) if isinstance(built, Path) else spec
     path, inside = split_source(Path(spec.source))
     lacking: dict[int, str] = {}
     with suppress(OSError):
@@ -170,7 +170,7 @@ def _aside(folder: Path) -> Generator[Path]:
         yield place
 
 
-def in_file(spec: ModelSpec, file: Path) -> ModelSpec:
+def _in_file(spec: ModelSpec, file: Path) -> ModelSpec:
     """The specification for the file that a source of models supplies, from the specification of the source's model."""
     return spec.model_copy(update={"source": str(file)})
 

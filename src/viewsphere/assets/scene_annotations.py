@@ -106,7 +106,7 @@ def _lane(marker: Marker, is_said: bool) -> Annotation | None:
     closed, problem = marker.said.get("closed", False) in (True, 1), ""
     points = tuple(place for _, place in sorted(marker.children, key=lambda child: naturally(child[0])))
     if marker.points:
-        points, around, problem = chained(marker.points, marker.edges)
+        points, around, problem = _chained(marker.points, marker.edges)
         closed = closed or around
     points = tuple(point for i, point in enumerate(points) if i == 0 or point != points[i - 1])
     if closed and len(points) > 1 and points[0] == points[-1]:
@@ -120,7 +120,7 @@ def _lane(marker: Marker, is_said: bool) -> Annotation | None:
     return Annotation(LANE, marker.name, "", points, None if width is None else float(width), closed, problem)
 
 
-def chained(points: Sequence[Point], edges: Sequence[Edge]) -> tuple[tuple[Point, ...], bool, str]:
+def _chained(points: Sequence[Point], edges: Sequence[Edge]) -> tuple[tuple[Point, ...], bool, str]:
     """The points along edges from end to end, whether the edges form a ring, and the reason why they are not one line, if any.
 
     The line starts at the end that its edge leads away from; if both or neither end is such, at the first one.

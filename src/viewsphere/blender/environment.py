@@ -22,8 +22,6 @@ PINNED = ("--disable-pip-version-check", "--require-hashes", "--only-binary", ":
 """Options of pip: only files with known digests, and only wheels, which run no code at installation."""
 
 PREFIX = "blender-making-"
-INSTALL_S = 3600.0
-"""Seconds for the installation: a download of 1 GB at 300 kB/s."""
 
 Listener = Callable[[str], None]
 

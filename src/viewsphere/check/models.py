@@ -43,19 +43,19 @@ def differing(dataset: Dataset, notes: list[str]) -> Iterator[Finding]:
         if is_imported and not info.parts:
             notes.append(f"models: the files of {info.key} are not compared, they were exported elsewhere")
             continue
-        names = named.setdefault(owner(info), {"model.json", MANIFEST, Path(info.glb).name})
+        names = named.setdefault(_owner(info), {"model.json", MANIFEST, Path(info.glb).name})
         try:
             problems = list(_problems(dataset, info, categories, names))
         except Exception as error:
             problems = [failure("files that can be compared", error)]
-        yield from ((owner(info), f"model {info.key}: {message}") for message in problems)
+        yield from ((_owner(info), f"model {info.key}: {message}") for message in problems)
     for key, names in named.items():
         for file in sorted(dataset.store.model_folder(key).iterdir()):
             if file.name not in names:
                 yield key, f"model {key}: expected no such file, because nothing in the data set names it: delete {file}"
 
 
-def owner(info: ModelInfo) -> str:
+def _owner(info: ModelInfo) -> str:
     """The key of the model that a time step belongs to; otherwise the model's own key."""
     return info.track or info.key
 
@@ -66,7 +66,7 @@ def _problems(dataset: Dataset, info: ModelInfo, categories: dict[int, Category]
     mesh = read_exported(dataset.path(info.glb), info.parts, info.node, whole=True)
     yield from _facts(info, mesh)
     places = [(dataset.path(file).parent, Path(file).suffix) for file in (info.obj, info.glb)]
-    if places != [(dataset.store.model_folder(owner(info)), suffix) for suffix in (".obj", ".glb")]:
+    if places != [(dataset.store.model_folder(_owner(info)), suffix) for suffix in (".obj", ".glb")]:
         yield f"expected files in its folder, found {info.obj} and {info.glb}"
     if known is None or (known.name, known.supercategory) != (info.category, info.supercategory):
         yield f"expected a category of the plan, found {info.category_id} {info.category!r} ({info.supercategory!r})"

@@ -50,7 +50,7 @@ def cache(
         if name not in KINDS:
             raise UserError(f"cache: --kind {name!r:.60} is unknown. Valid: {', '.join(KINDS)}")
     if action == Action.INFO:
-        held = {"folder": str(cache_folder()), "limit": limits.CACHE_LIMIT, "kinds": by_kind(budget.entries())}
+        held = {"folder": str(cache_folder()), "limit": limits.CACHE_LIMIT, "kinds": _by_kind(budget.entries())}
         print_json(held) if json_ else _tell(held)
         return
     if action == Action.CLEAR:
@@ -64,7 +64,7 @@ def cache(
         say(f"{cache_folder()}: {_files(len(gone))} deleted, {size / MEGABYTE:,.1f} MB")
 
 
-def by_kind(entries: Iterable[Entry]) -> dict[str, Any]:
+def _by_kind(entries: Iterable[Entry]) -> dict[str, Any]:
     """For each kind of entry: number, bytes, and time of the last use in seconds since 1970."""
     from viewsphere.caches import KINDS
 

@@ -106,14 +106,14 @@ def rate(seconds: float) -> Fraction:
     return Fraction(1 / seconds).limit_denominator(1001)
 
 
-def ticks(seconds: float) -> int:
+def _ticks(seconds: float) -> int:
     """Ticks per second, at least `TICKS`, that make this duration a whole number of ticks."""
     whole = rate(seconds).numerator
     return whole * -(-TICKS // whole)
 
 
 def _command(file: Path, seconds: float, by: Encoder) -> list[str]:
-    clock = ticks(seconds)
+    clock = _ticks(seconds)
     taken = ("-v", "error", "-nostdin", "-y", "-f", "matroska", "-i", "pipe:0")
     coded = ("-c:v", by.codec, *CODECS[by.codec], "-pix_fmt", "yuv420p", "-sws_flags", "bicubic+accurate_rnd+bitexact")
     timed = ("-fps_mode", "passthrough", "-enc_time_base", f"1:{clock}", "-video_track_timescale", str(clock))

@@ -214,7 +214,7 @@ class Composition(Sendable):
             return None
         piece = self._place(self.place_names(subject, pose, redraw))[0]
         room_from_piece = composed(_inverse(world_from_room), piece.world_from_piece)
-        return lambda height, reach: built_of((piece.model, None), room_from_piece, height, reach)
+        return lambda height, reach: _built_of((piece.model, None), room_from_piece, height, reach)
 
     def furniture(self, subject: str, pose: str | None, redraw: int) -> Built | None:
         """A function that returns the objects on the roads, bays and pavements of a zoo's place, such as lamp posts and parked
@@ -225,7 +225,7 @@ class Composition(Sendable):
             return None
         pieces = self._place(self.place_names(subject, pose, redraw))
         placed = tuple(sorted(((p.model, p.world_from_piece) for p in pieces), key=lambda one: one[0].key))
-        return lambda height, reach: furniture_of(placed, height, reach)
+        return lambda height, reach: _furniture_of(placed, height, reach)
 
     def lanes(self, subject: str, pose: str | None, redraw: int = 0) -> tuple[Lane, ...]:
         """The lanes of the place, in world axes; empty for places without."""
@@ -372,14 +372,14 @@ def compose(
 
 
 @lru_cache(maxsize=4)
-def built_of(shown: tuple[ModelSpec, None], room_from_piece: Matrix4, height: float, reach: float) -> Obstacles | None:
+def _built_of(shown: tuple[ModelSpec, None], room_from_piece: Matrix4, height: float, reach: float) -> Obstacles | None:
     """The triangles of a model up to a height above a room's floor; the last results are kept."""
     mesh = shape_of(shown)
     return obstacles(transform(np.array(room_from_piece), mesh.vertices), mesh.triangles, height, reach)
 
 
 @lru_cache(maxsize=4)
-def furniture_of(pieces: tuple[tuple[ModelSpec, Matrix4], ...], height: float, reach: float) -> Obstacles | None:
+def _furniture_of(pieces: tuple[tuple[ModelSpec, Matrix4], ...], height: float, reach: float) -> Obstacles | None:
     """The triangles of a place's pieces between its kerbs and a height; the last results are cached. Pieces of one model follow
     one another, so that each mesh is read once.
     """

@@ -78,7 +78,7 @@ def _filled(shot: Shot, i: int, together: bool) -> Instant:
 
     def fill_at(distance: float) -> float:
         at = _moved(now, view, distance)
-        return share_filled(shot.model_copy(update={"instants": (at,)}).camera(0), placed)
+        return _share_filled(shot.model_copy(update={"instants": (at,)}).camera(0), placed)
 
     distance = distance_of(view.fill, fill_at, _reach(placed, now))
     if distance is None:
@@ -106,7 +106,7 @@ def _reach(placed: Sequence[Shape], now: Instant) -> float:
     return max(float(np.linalg.norm(shape.vertices - np.array(now.focus), axis=1).max()) for shape in placed) or 1.0
 
 
-def share_filled(camera: Camera, placed: Sequence[Shape]) -> float:
+def _share_filled(camera: Camera, placed: Sequence[Shape]) -> float:
     """The larger of box width / picture width and box height / picture height, for the box around all shapes (in world axes) as
     the camera projects them, as in the label `box2d_unclipped`. Infinite if the lens does not show all of them.
     """

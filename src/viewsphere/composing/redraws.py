@@ -34,7 +34,7 @@ def redraws_frames(recipe: Recipe) -> bool:
     return jitter.draw == "per_frame" and is_random(jitter)
 
 
-def redraws_scenes(recipe: Recipe) -> bool:
+def _redraws_scenes(recipe: Recipe) -> bool:
     """Return whether the recipe draws where its models stand, or the place around them."""
     scene = recipe.scene
     if recipe.scenes is not None and not isinstance(recipe.scenes, ScenesEntry):
@@ -53,19 +53,19 @@ def redraws_place(recipe: Recipe) -> bool:
 
 def is_redrawn(recipe: Recipe) -> bool:
     """Return whether cameras that do not fit can be redrawn: early checks leave them to the shot."""
-    return redraws_frames(recipe) or redraws_scenes(recipe)
+    return redraws_frames(recipe) or _redraws_scenes(recipe)
 
 
 def scene_draws(recipe: Recipe) -> int:
-    """The number of draws of a scene, the original included; after every `redraws_each` of them it drops one object more."""
-    if not redraws_scenes(recipe):
+    """The number of draws of a scene, the original included; after every `_redraws_each` of them it drops one object more."""
+    if not _redraws_scenes(recipe):
         return 1
     scenes, company = recipe.scenes, recipe.scene.company
     most = scenes.most_objects if isinstance(scenes, ScenesEntry) else company.number if company is not None else 0
-    return redraws_each(recipe) * (1 + most - least_objects(recipe, most))
+    return _redraws_each(recipe) * (1 + most - least_objects(recipe, most))
 
 
-def redraws_each(recipe: Recipe) -> int:
+def _redraws_each(recipe: Recipe) -> int:
     """Draws of a scene with the same number of objects."""
     scenes, company = recipe.scenes, recipe.scene.company
     layout = scenes.layout if isinstance(scenes, ScenesEntry) else company.layout if company is not None else None
@@ -74,7 +74,7 @@ def redraws_each(recipe: Recipe) -> int:
 
 def fewer(recipe: Recipe, redraw: int) -> int:
     """The number of objects that a redraw drops from a scene with more than its least number."""
-    return redraw // redraws_each(recipe) if redraw else 0
+    return redraw // _redraws_each(recipe) if redraw else 0
 
 
 def least_objects(recipe: Recipe, objects: int) -> int:

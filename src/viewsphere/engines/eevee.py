@@ -15,9 +15,9 @@ if TYPE_CHECKING:
     from pydantic import JsonValue
 
 
-def check(options: Mapping[str, JsonValue]) -> None:
+def _check(options: Mapping[str, JsonValue]) -> None:
     """Raise UserError for an unknown option (with the nearest name), a value out of range, or a missing Blender."""
     _blender.check(options, "eevee")
 
 
-ENGINE = EngineSpec(check=check, stage=stage, opens_scenes=True, catches_shadows=False, programs=PROGRAMS)
+ENGINE = EngineSpec(check=_check, stage=stage, opens_scenes=True, catches_shadows=False, programs=PROGRAMS)

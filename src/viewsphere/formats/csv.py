@@ -63,7 +63,7 @@ class Options(Frozen):
     safe: bool = Field(default=True, description="`true`: a ' in front of texts that spreadsheets would run as formulas")
 
 
-def preparer(dataset: Dataset, folder: Path, options: Options) -> Callable[[Sample], list[list[Any]]]:
+def _preparer(dataset: Dataset, folder: Path, options: Options) -> Callable[[Sample], list[list[Any]]]:
     """Puts a sample's picture in place, and makes its rows."""
 
     def prepare(sample: Sample) -> list[list[Any]]:
@@ -75,7 +75,7 @@ def preparer(dataset: Dataset, folder: Path, options: Options) -> Callable[[Samp
 
 
 @contextmanager
-def writer(
+def _writer(
     dataset: Dataset, folder: Path, note: Callable[[str], None], options: Options
 ) -> Generator[Callable[[list[list[Any]]], None]]:
     """Write the table."""
@@ -167,7 +167,7 @@ FORMAT = FormatSpec(
     options=Options,
     channels=(),  # pictures are used if there are any
     names_credits=False,
-    writer=writer,
-    preparer=preparer,
+    writer=_writer,
+    preparer=_preparer,
     verify=verify,
 )

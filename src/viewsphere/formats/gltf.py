@@ -46,13 +46,13 @@ MESHES = 64
 """Number of models to keep in memory."""
 
 
-def refuses(scope: Scope) -> Iterator[str]:
+def _refuses(scope: Scope) -> Iterator[str]:
     """Reasons to refuse: no picture has a known camera."""
     yield from any_camera(scope)
 
 
 @contextmanager
-def writer(dataset: Dataset, folder: Path, note: Callable[[str], None]) -> Generator[Callable[[Sample], None]]:
+def _writer(dataset: Dataset, folder: Path, note: Callable[[str], None]) -> Generator[Callable[[Sample], None]]:
     """Write the table, and, when all cameras are known, the scenes."""
     with temporary("cameras") as scratch_folder, (folder / TABLE).open("w", encoding="utf-8", newline="") as table:
         scenes = _Scenes(dataset, scratch_folder)
@@ -178,7 +178,7 @@ FORMAT = FormatSpec(
     channels=(),
     keeps_all_objects=True,  # hidden objects are part of a scene, too
     names_credits=False,
-    refuses=refuses,
-    writer=writer,
+    refuses=_refuses,
+    writer=_writer,
     verify=verify,
 )

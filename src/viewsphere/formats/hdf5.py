@@ -71,17 +71,17 @@ class Options(Frozen):
     )
 
 
-def check() -> None:
+def _check() -> None:
     """Raise MissingExtraError if h5py is missing."""
     _library()
 
 
-def needs(options: Options) -> tuple[str, ...]:
+def _needs(options: Options) -> tuple[str, ...]:
     """The channels of these keys."""
     return tuple(SOURCES[key] for key in options.keys)
 
 
-def refuses(scope: Scope, options: Options) -> Iterator[str]:
+def _refuses(scope: Scope, options: Options) -> Iterator[str]:
     """Reasons to refuse: flow of still pictures."""
     if any("flow" in key for key in options.keys):
         yield from sequences(scope)
@@ -187,9 +187,9 @@ FORMAT = FormatSpec(
     read_by=("h5py", "BlenderProc"),
     options=Options,
     names_credits=False,
-    needs=needs,
-    refuses=refuses,
-    check=check,
+    needs=_needs,
+    refuses=_refuses,
+    check=_check,
     writer=writer,
     preparer=preparer,
     verify=verify,

@@ -63,7 +63,7 @@ class Options(Frozen):
     )
 
 
-def needs(options: Options) -> tuple[str, ...]:
+def _needs(options: Options) -> tuple[str, ...]:
     """Labels of scene flow."""
     return ("disparity_change", "instances") if options.set == "scene_flow_2015" else ()
 
@@ -156,7 +156,7 @@ FORMAT = FormatSpec(
     options=Options,
     channels=("rgb", "flow", "flow_state", "disparity", "disparity_state"),
     names_credits=False,
-    needs=needs,
+    needs=_needs,
     refuses=refuses,
     writer=writer,
     preparer=preparer,

@@ -47,7 +47,7 @@ from viewsphere.plugins.format import FormatSpec
 from viewsphere.store import Dataset
 
 
-def refuses(scope: Scope) -> Iterator[str]:
+def _refuses(scope: Scope) -> Iterator[str]:
     """Reasons to refuse: still pictures, distorted lenses, and rigs unlike KITTI's car."""
     yield from sequences(scope)
     yield from unknown_shots(scope)
@@ -103,7 +103,7 @@ FORMAT = FormatSpec(
     channels=("rgb",),
     lidar=True,
     names_credits=False,
-    refuses=refuses,
+    refuses=_refuses,
     writer=writer,
     preparer=preparer,
     verify=verify,

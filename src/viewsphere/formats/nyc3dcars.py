@@ -75,7 +75,7 @@ class Options(Frozen):
     altitude: float = Field(default=0.0, ge=-1e5, le=1e5, description="metres above the ellipsoid")
 
 
-def refuses(scope: Scope, options: Options) -> Iterator[str]:
+def _refuses(scope: Scope, options: Options) -> Iterator[str]:
     """Reasons to refuse: cameras that Bundler cannot express."""
     yield from known_views(scope)
     yield from pinhole(scope)
@@ -167,7 +167,7 @@ FORMAT = FormatSpec(
     options=Options,
     channels=("rgb",),
     names_credits=False,
-    refuses=refuses,
+    refuses=_refuses,
     writer=writer,
     preparer=preparer,
     verify=verify,

@@ -46,17 +46,17 @@ from viewsphere.plugins.format import FormatSpec
 from viewsphere.store import Dataset
 
 
-def check() -> None:
+def _check() -> None:
     """Raise MissingExtraError if scipy is missing."""
     scipy_io("objectnet3d")
 
 
-def needs(options: Options) -> tuple[str, ...]:
+def _needs(options: Options) -> tuple[str, ...]:
     """Labels on request."""
     return ("keypoints",) if options.anchors else ()
 
 
-def refuses(scope: Scope, options: Options) -> Iterator[str]:
+def _refuses(scope: Scope, options: Options) -> Iterator[str]:
     """Yield the reasons why viewpoints cannot describe a data set."""
     yield from no_viewpoints(scope)
 
@@ -103,9 +103,9 @@ FORMAT = FormatSpec(
     options=Options,
     channels=("rgb",),
     names_credits=False,
-    needs=needs,
-    refuses=refuses,
-    check=check,
+    needs=_needs,
+    refuses=_refuses,
+    check=_check,
     writer=writer,
     preparer=preparer,
     verify=verify,

@@ -52,7 +52,7 @@ CORNERS = np.array([(-1, -1, -1), (1, -1, -1), (1, 1, -1), (-1, 1, -1), (-1, -1,
 """A box's corners in its own axes, in Omni3D's order, as shares of length, height and width."""
 
 
-def refuses(scope: Scope) -> Iterator[str]:
+def _refuses(scope: Scope) -> Iterator[str]:
     """Reasons to refuse: unknown cameras, and distorted lenses."""
     yield from known_cameras(scope)
     yield from pinhole(scope)
@@ -151,7 +151,7 @@ FORMAT = FormatSpec(
     read_by=("Cube R-CNN", "pycocotools"),
     channels=("rgb",),
     names_credits=False,
-    refuses=refuses,
+    refuses=_refuses,
     writer=writer,
     preparer=preparer,
     verify=verify,

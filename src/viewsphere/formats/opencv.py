@@ -40,7 +40,7 @@ from viewsphere.store import Dataset
 Value = int | str | NDArray[np.float64]
 
 
-def refuses(scope: Scope) -> Iterator[str]:
+def _refuses(scope: Scope) -> Iterator[str]:
     """Reasons to refuse: unknown cameras, skew, and lenses that OpenCV lacks."""
     yield from known_cameras(scope)
     yield from no_skew(scope)
@@ -147,7 +147,7 @@ FORMAT = FormatSpec(
     channels=(),
     lidar=True,
     names_credits=False,
-    refuses=refuses,
+    refuses=_refuses,
     writer=writer,
     preparer=preparer,
     verify=verify,

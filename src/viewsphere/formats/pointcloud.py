@@ -49,17 +49,17 @@ class Options(Frozen):
     )
 
 
-def needs(options: Options) -> tuple[str, ...]:
+def _needs(options: Options) -> tuple[str, ...]:
     """The channels that these options require."""
     return ("surface_samples",) if options.surface == "complete" else ()
 
 
-def refuses(scope: Scope, options: Options) -> Iterator[str]:
+def _refuses(scope: Scope, options: Options) -> Iterator[str]:
     """Yield an error if no picture has a known camera."""
     yield from any_camera(scope)
 
 
-def preparer(dataset: Dataset, folder: Path, options: Options) -> Callable[[Sample], None]:
+def _preparer(dataset: Dataset, folder: Path, options: Options) -> Callable[[Sample], None]:
     """Write a sample's cloud."""
 
     def prepare(sample: Sample) -> None:
@@ -72,9 +72,9 @@ def preparer(dataset: Dataset, folder: Path, options: Options) -> Callable[[Samp
 
 
 @contextmanager
-def writer(dataset: Dataset, folder: Path, note: Callable[[str], None], options: Options) -> Generator[Callable[[None], None]]:
+def _writer(dataset: Dataset, folder: Path, note: Callable[[str], None], options: Options) -> Generator[Callable[[None], None]]:
     """A writer that adds nothing: the clouds are the whole export."""
-    for name in missing(needs(options), dataset.plan.channels):
+    for name in missing(_needs(options), dataset.plan.channels):
         raise UserError(
             f"pointcloud: expected a data set with the channel {name}, of which complete clouds are made; found none"
         )
@@ -121,9 +121,9 @@ FORMAT = FormatSpec(
     options=Options,
     channels=("depth", "instances"),
     names_credits=False,
-    needs=needs,
-    refuses=refuses,
-    writer=writer,
-    preparer=preparer,
+    needs=_needs,
+    refuses=_refuses,
+    writer=_writer,
+    preparer=_preparer,
     verify=verify,
 )

@@ -50,7 +50,7 @@ SYNSETS = {
 }  # fmt: skip
 
 
-def refuses(scope: Scope) -> Iterator[str]:
+def _refuses(scope: Scope) -> Iterator[str]:
     """Reasons to refuse: unknown viewpoints, and names that the format cannot distinguish."""
     yield from known_views(scope)
     first = dict[str, str]()
@@ -141,7 +141,7 @@ FORMAT = FormatSpec(
     read_by=("RenderForCNN",),
     channels=("rgb",),
     names_credits=False,
-    refuses=refuses,
+    refuses=_refuses,
     writer=writer,
     preparer=preparer,
     verify=verify,

@@ -63,7 +63,7 @@ class Options(Frozen):
     stereo: bool = Field(default=False, description="the archive of stereo pairs, too; of a rig of two rectified cameras")
 
 
-def needs(options: Options) -> tuple[str, ...]:
+def _needs(options: Options) -> tuple[str, ...]:
     """Labels of pairs."""
     return ("disparity", "disparity_state") if options.stereo else ()
 
@@ -93,7 +93,7 @@ class Sintel(Tree):
         if side == "left":
             yield File(f"{root}/clean/{name}.png", picture(sample, ".png"))
             yield File(f"{root}/depth/{name}.dpt", Coded(sample.index, "depth.dpt", lambda: tagged(sample.channels["depth"])))
-            yield File(f"{root}/camdata_left/{name}.cam", cam(sample.camera))
+            yield File(f"{root}/camdata_left/{name}.cam", _cam(sample.camera))
             yield File(f"{root}/segmentation/{name}.png", Coded(sample.index, "ids 24.png", partial(_ids, sample)))
             if "albedo" in sample.channels:
                 yield File(f"{root}/albedo/{name}.png", Coded(sample.index, "albedo.png", partial(_albedo, sample)))
@@ -111,7 +111,7 @@ class Sintel(Tree):
             yield File(f"{root}/outofframe/{name}", states_png(sample, "disparity_state", 2, 3))
 
 
-def cam(camera: Camera) -> bytes:
+def _cam(camera: Camera) -> bytes:
     """A camera as Sintel's .cam: the tag, M and N, float64."""
     lens = camera.K.copy()
     lens[:2, 2] -= 0.5
@@ -123,14 +123,14 @@ def _disparity(sample: Sample) -> bytes:
     steps = np.rint(disparity * 2**14).astype(np.int64)
     if steps.max() >= MOST << 14:
         raise UserError(f"frame {sample.index}: sintel: expected disparity below {MOST} pixels; found {disparity.max():.1f}")
-    return encode_png(bytes_of(steps, 16, 8, 0))
+    return encode_png(_bytes_of(steps, 16, 8, 0))
 
 
 def _ids(sample: Sample) -> bytes:
-    return encode_png(bytes_of(sample.channels["instances"].astype(np.int64), 16, 8, 0))
+    return encode_png(_bytes_of(sample.channels["instances"].astype(np.int64), 16, 8, 0))
 
 
-def bytes_of(numbers: NDArray[np.int64], *shifts: int) -> NDArray[np.uint8]:
+def _bytes_of(numbers: NDArray[np.int64], *shifts: int) -> NDArray[np.uint8]:
     """Numbers (H, W) as pixels: the bytes that start at these bits."""
     return np.stack([numbers >> shift & 255 for shift in shifts], axis=-1).astype(np.uint8)
 
@@ -149,7 +149,7 @@ FORMAT = FormatSpec(
     options=Options,
     channels=("rgb", "depth", "instances", "flow", "flow_state"),
     names_credits=False,
-    needs=needs,
+    needs=_needs,
     refuses=refuses,
     writer=writer,
     preparer=preparer,

@@ -123,7 +123,7 @@ class Options(Frozen):
     )
 
 
-def needs(options: Options) -> tuple[str, ...]:
+def _needs(options: Options) -> tuple[str, ...]:
     """Return the additional channels of sequences."""
     return ("depth", "instances") if options.layout == "seqs" else ()
 
@@ -179,7 +179,7 @@ class Synthia(Tree):
             ("GT/COLOR", color),
         ):
             yield File(f"{root}/{kind}/{camera}/{sample.instant:06d}.png", content)
-        yield File(f"{root}/CameraParams/{camera}/{sample.instant:06d}.txt", extrinsics(sample.camera))
+        yield File(f"{root}/CameraParams/{camera}/{sample.instant:06d}.txt", _extrinsics(sample.camera))
         lens = sample.camera.intrinsics
         told = "\n\n".join(f"{value!r}" for value in (lens.fx, lens.cx, lens.cy, self._eyes.pair(sample).baseline))
         yield Piece(f"{root}/CameraParams/intrinsics.txt", b"", f"{told}\n")
@@ -217,7 +217,7 @@ def _named(numbered: Numbered, classes: tuple[SemanticClass, ...], light: int) -
     return [name for name, _ in found], np.array([color for _, color in found], np.uint8)
 
 
-def extrinsics(camera: Camera) -> bytes:
+def _extrinsics(camera: Camera) -> bytes:
     """The motion from a camera to the world, both left-handed with y up, as 16 numbers, column by column."""
     matrix = np.eye(4)
     matrix[:3, :3], matrix[:3, 3] = SWAPPED @ camera.R.T @ UPWARD, transform(SWAPPED, camera.center)
@@ -251,7 +251,7 @@ FORMAT = FormatSpec(
     options=Options,
     channels=("rgb", "semantic"),
     names_credits=False,
-    needs=needs,
+    needs=_needs,
     refuses=refuses,
     writer=writer,
     preparer=preparer,

@@ -47,7 +47,7 @@ class Options(Frozen):
 
 
 @dataclass(frozen=True)
-class Piece:
+class _Piece:
     """The next bytes of a file of the export, and their offset; `frame`: the frame that they belong to; `what`: their
     description.
     """
@@ -60,13 +60,13 @@ class Piece:
 
 
 @contextmanager
-def writer(
+def _writer(
     dataset: Dataset, folder: Path, note: Callable[[str], None], options: Options
 ) -> Generator[Callable[[Sample], None]]:
     """Write the shards and their indices; no more than a sample is held in memory."""
     shards = _Shards(dataset, options)
 
-    def put(pieces: Iterator[Piece]) -> None:
+    def put(pieces: Iterator[_Piece]) -> None:
         for piece in pieces:
             with (folder / piece.file).open("ab") as file:
                 file.write(piece.data)
@@ -88,7 +88,7 @@ def verify(dataset: Dataset, folder: Path, sampled: Collection[int], options: Op
     yield from check_files(dataset, folder, (), (), sizes)
 
 
-def _found(file: Path, piece: Piece) -> bytes:
+def _found(file: Path, piece: _Piece) -> bytes:
     with open_file(file) as shard:
         shard.seek(piece.begin)
         return shard.read(len(piece.data))
@@ -106,25 +106,25 @@ class _Split:
     def file(self, number: int) -> str:
         return f"{self.name}-{number:06d}.tar"
 
-    def add(self, data: bytes, what: str, frame: int | None = None) -> Piece:
+    def add(self, data: bytes, what: str, frame: int | None = None) -> _Piece:
         self.size += len(data)
-        return Piece(self.file(len(self.whole)), self.size - len(data), data, what, frame)
+        return _Piece(self.file(len(self.whole)), self.size - len(data), data, what, frame)
 
-    def end(self) -> Iterator[Piece]:
+    def end(self) -> Iterator[_Piece]:
         """The end of the current shard, if there is one."""
         if self.samples:
             yield self.add(tar.ending(self.size), "its end")
             self.whole.append((self.samples, self.size))
             self.samples = self.size = 0
 
-    def index(self, categories: list[dict[str, Any]]) -> Piece:
+    def index(self, categories: list[dict[str, Any]]) -> _Piece:
         shards = [
             {"url": self.file(number), "nsamples": samples, "filesize": size}
             for number, (samples, size) in enumerate(self.whole)
         ]
         head = {"__kind__": "wids-shard-index-v1", "wids_version": 1, "name": self.name}
         data = json_bytes({**head, "categories": categories, "shardlist": shards}) + b"\n"
-        return Piece(f"{self.name}.json", 0, data, "its shards and categories")
+        return _Piece(f"{self.name}.json", 0, data, "its shards and categories")
 
 
 class _Shards:
@@ -134,13 +134,13 @@ class _Shards:
         self._dataset, self._options = dataset, options
         self._splits: dict[str, _Split] = {}
 
-    def all(self) -> Iterator[Piece]:
+    def all(self) -> Iterator[_Piece]:
         """The bytes of all files."""
         for sample in self._dataset:
             yield from self.add(sample)
         yield from self.end()
 
-    def add(self, sample: Sample) -> Iterator[Piece]:
+    def add(self, sample: Sample) -> Iterator[_Piece]:
         """The bytes of a sample, preceded by the end of the previous shard if the sample starts a new one."""
         split = self._splits.setdefault(sample.split, _Split(sample.split))
         files = [(name, tar.member(name, data)) for name, data in self._files(sample)]
@@ -150,7 +150,7 @@ class _Shards:
         split.samples += 1
         yield from (split.add(data, name, sample.index) for name, data in files)
 
-    def end(self) -> Iterator[Piece]:
+    def end(self) -> Iterator[_Piece]:
         """Yield the ends of the last shards, and the indices."""
         categories = [dict(c.__dict__) for c in self._dataset.categories]
         for split in self._splits.values():
@@ -186,6 +186,6 @@ FORMAT = FormatSpec(
     read_by=("webdataset", "wids"),
     options=Options,
     names_credits=False,
-    writer=writer,
+    writer=_writer,
     verify=verify,
 )

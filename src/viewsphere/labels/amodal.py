@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from viewsphere.labels.shared.context import LabelContext
 
 
-def compute(context: LabelContext, i: int) -> Mapping[str, Any]:
+def _compute(context: LabelContext, i: int) -> Mapping[str, Any]:
     """The pixels that would show the object if it were alone, and their tight box.
 
     Y. Zhu et al., Semantic Amodal Segmentation (https://arxiv.org/abs/1509.01329), cut off at the image's border, as in COCOA
@@ -36,7 +36,7 @@ def compute(context: LabelContext, i: int) -> Mapping[str, Any]:
     return _fields(height, width, rle_of_part(height, width, part, x0, y0))
 
 
-def restore(counts: str, placement: Placement, o: ObjectAnnotation) -> Mapping[str, Any]:
+def _restore(counts: str, placement: Placement, o: ObjectAnnotation) -> Mapping[str, Any]:
     """Both fields, from the stored run-length code."""
     return _fields(placement.camera.height, placement.camera.width, counts)
 
@@ -46,7 +46,7 @@ def _fields(height: int, width: int, counts: str) -> Mapping[str, Any]:
     return {"amodal": Rle(height, width, counts), "box2d_amodal": tight and tuple(map(float, tight))}
 
 
-def prove(sample: Sample, models: Models) -> Iterator[str]:
+def _prove(sample: Sample, models: Models) -> Iterator[str]:
     """The mask contains the visible mask, in the proportion given by visibility and truncation; the box is tight."""
     for o in rendered(sample):
         amodal = decode_rle(o.amodal.height, o.amodal.width, o.amodal.counts)
@@ -66,7 +66,7 @@ def prove(sample: Sample, models: Models) -> Iterator[str]:
             )
 
 
-def draw(pen: ImageDraw, sample: Sample, scale: float) -> None:
+def _draw(pen: ImageDraw, sample: Sample, scale: float) -> None:
     """The hidden pixels of each object hatched in its colour, and the box of all its pixels."""
     for o in sample.objects:
         if o.box2d_amodal is None:
@@ -90,9 +90,9 @@ LABEL = ObjectLabel(
         Field("amodal", "COCO's compressed run-length code of the pixels that it alone would cover", Rle, ids={}),
         Field("box2d_amodal", "their half-open corners (x0, y0, x1, y1), None without any", float, (4,), "px", optional=True),
     ),
-    compute=compute,
+    compute=_compute,
     keep=lambda o: o.amodal.counts,
-    restore=restore,
-    prove=prove,
-    drawing=Drawing("amodal", lines=draw, key=(("amodal: hidden parts are hatched", None),)),
+    restore=_restore,
+    prove=_prove,
+    drawing=Drawing("amodal", lines=_draw, key=(("amodal: hidden parts are hatched", None),)),
 )

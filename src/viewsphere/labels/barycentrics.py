@@ -20,7 +20,7 @@ the float32 weights are large.
 """
 
 
-def compute(context: LabelContext) -> NDArray[np.float32]:
+def _compute(context: LabelContext) -> NDArray[np.float32]:
     """Weights (H, W, 3) of the seen triangle's corners; 0 where nothing is seen."""
     from viewsphere.truth.raster import kernels_channels as kernels
 
@@ -41,7 +41,7 @@ def prove(sample: Sample, models: Models) -> Iterator[str]:
         yield f"expected weights that add up to 1, found others at {wrong.sum()} pixels"
 
 
-def picture(weights: NDArray[np.float32]) -> Picture:
+def _picture(weights: NDArray[np.float32]) -> Picture:
     """Weights as a picture (H, W, 3) uint8: red at each triangle's first corner, green at the second, blue at the third."""
     return (np.clip(weights, 0, 1) * 255).round().astype(np.uint8)
 
@@ -51,11 +51,11 @@ LABEL = ChannelLabel(
     meaning="weights of the triangle's corners at the seen point",
     dtype=np.float32,
     components=3,
-    compute=compute,
+    compute=_compute,
     prove=prove,
     drawing=Drawing(
         "barycentrics",
-        beside=lambda sample: picture(sample.channels["barycentrics"]),
+        beside=lambda sample: _picture(sample.channels["barycentrics"]),
         key=(("barycentrics: red, green and blue are the triangle's first, second and third corner", None),),
     ),
 )

@@ -37,7 +37,7 @@ class BirdsEye:
     yaw_deg: float
 
 
-def fields(placement: Placement) -> Mapping[str, Any]:
+def _fields(placement: Placement) -> Mapping[str, Any]:
     """The rectangle along the object's heading around its box (which may be tilted), and the rectangle's corners."""
     pose = placement.world_from_object
     cos, sin = _heading(pose)
@@ -63,7 +63,7 @@ def _heading(pose: Any) -> tuple[float, float]:
     return x / length, y / length
 
 
-def prove(sample: Sample, models: Models) -> Iterator[str]:
+def _prove(sample: Sample, models: Models) -> Iterator[str]:
     """The rectangle contains the world box and touches it on each side, and the stored corners match the rectangle."""
     for o in rendered(sample):
         told, corners = o.birds_eye, o.birds_eye_corners
@@ -81,7 +81,7 @@ def prove(sample: Sample, models: Models) -> Iterator[str]:
             yield f"object {o.id}: expected birds_eye_corners {np.array(expected).tolist()}, found {corners.tolist()}"
 
 
-def draw(pen: ImageDraw, sample: Sample, scale: float) -> None:
+def _draw(pen: ImageDraw, sample: Sample, scale: float) -> None:
     """The rectangle at the height of the box's lowest corner, with a line to its front."""
     for o in sample.objects:
         low = float(o.box3d[:, 2].min())
@@ -91,7 +91,7 @@ def draw(pen: ImageDraw, sample: Sample, scale: float) -> None:
 
 
 LABEL = ObjectLabel.from_placement(
-    fields,
+    _fields,
     name="birds_eye",
     meaning="its box from above",
     axes="world",
@@ -102,6 +102,6 @@ LABEL = ObjectLabel.from_placement(
             "birds_eye_corners", "corners: front left, front right, back right, back left", float, (4, 2), "m", is_array=True
         ),
     ),
-    prove=prove,
-    drawing=Drawing("birds_eye", lines=draw, key=(("birds_eye: a line leads to the front", None),)),
+    prove=_prove,
+    drawing=Drawing("birds_eye", lines=_draw, key=(("birds_eye: a line leads to the front", None),)),
 )

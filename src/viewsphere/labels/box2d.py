@@ -17,19 +17,19 @@ if TYPE_CHECKING:
     from viewsphere.labels.shared.context import LabelContext
 
 
-def compute(context: LabelContext, i: int) -> Mapping[str, Any]:
+def _compute(context: LabelContext, i: int) -> Mapping[str, Any]:
     """Half-open pixel corners, None if no pixel shows the object."""
     seen = context.instances
     return {"box2d": tuple(map(float, seen.box[i + 1].tolist())) if seen.area[i + 1] else None}
 
 
-def restore(kept: None, placement: Placement, o: ObjectAnnotation) -> Mapping[str, Any]:
+def _restore(kept: None, placement: Placement, o: ObjectAnnotation) -> Mapping[str, Any]:
     """The box of the object's mask, which is stored."""
     tight = rle_box(o.rle.height, o.rle.width, o.rle.counts)
     return {"box2d": tight and tuple(map(float, tight))}
 
 
-def prove(sample: Sample, models: Models) -> Iterator[str]:
+def _prove(sample: Sample, models: Models) -> Iterator[str]:
     """The box is tight around the mask."""
     for o in rendered(sample):
         tight = mask_box(o.mask)
@@ -37,7 +37,7 @@ def prove(sample: Sample, models: Models) -> Iterator[str]:
             yield f"object {o.id}: expected box2d {tight}, found {o.box2d}"
 
 
-def draw(pen: ImageDraw, sample: Sample, scale: float) -> None:
+def _draw(pen: ImageDraw, sample: Sample, scale: float) -> None:
     """Every visible object's box, in its colour."""
     for o in sample.objects:
         if o.box2d is not None:
@@ -52,8 +52,8 @@ LABEL = ObjectLabel(
     fields=(
         Field("box2d", "half-open corners (x0, y0, x1, y1), None where nothing is visible", float, (4,), "px", optional=True),
     ),
-    compute=compute,
-    restore=restore,
-    prove=prove,
-    drawing=Drawing("boxes", lines=draw),
+    compute=_compute,
+    restore=_restore,
+    prove=_prove,
+    drawing=Drawing("boxes", lines=_draw),
 )

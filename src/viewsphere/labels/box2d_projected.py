@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from viewsphere.labels.shared.context import LabelContext
 
 
-def compute(context: LabelContext, i: int) -> Mapping[str, Any]:
+def _compute(context: LabelContext, i: int) -> Mapping[str, Any]:
     """Both boxes, clipped and unclipped. If the lens shows only a part of the model, the box includes the centres of its
     visible pixels. Otherwise surface nearer than the near limit of projected boxes would be in no box.
     """
@@ -37,14 +37,14 @@ def _clipped(bounds: Bounds | None, camera: Camera) -> Bounds | None:
     return bounds and clip_to_image(bounds, camera.width, camera.height)
 
 
-def keep(o: ObjectAnnotation) -> Any:
+def _keep(o: ObjectAnnotation) -> Any:
     """The unclipped box, from which the clipped box follows; without an unclipped box, {"cut": the clipped box}."""
     if o.box2d_unclipped is not None:
         return list(o.box2d_unclipped)
     return None if o.box2d_projected is None else {"cut": list(o.box2d_projected)}
 
 
-def restore(kept: Any, placement: Placement, o: ObjectAnnotation) -> Mapping[str, Any]:
+def _restore(kept: Any, placement: Placement, o: ObjectAnnotation) -> Mapping[str, Any]:
     """Both boxes, from the stored one."""
     if isinstance(kept, dict):
         return {"box2d_projected": tuple(kept["cut"]), "box2d_unclipped": None}
@@ -52,7 +52,7 @@ def restore(kept: Any, placement: Placement, o: ObjectAnnotation) -> Mapping[str
     return {"box2d_projected": _clipped(bounds, placement.camera), "box2d_unclipped": bounds}
 
 
-def prove(sample: Sample, models: Models) -> Iterator[str]:
+def _prove(sample: Sample, models: Models) -> Iterator[str]:
     """The projected box contains the visible pixels and is the clipped form of the unclipped box, which is inside the projected
     3D box.
     """
@@ -77,7 +77,7 @@ def _within(inner: tuple[float, ...], outer: tuple[float, ...], slack: float) ->
     )
 
 
-def draw(pen: ImageDraw, sample: Sample, scale: float) -> None:
+def _draw(pen: ImageDraw, sample: Sample, scale: float) -> None:
     """Every object's box, seen or hidden, in its colour."""
     for o in sample.objects:
         if o.box2d_projected is not None:
@@ -94,9 +94,9 @@ LABEL = ObjectLabel(
         Field("box2d_projected", f"{_CORNERS}, clipped to the image; None outside of it", float, (4,), "px", optional=True),
         Field("box2d_unclipped", f"{_CORNERS}; None where it reaches behind the camera", float, (4,), "px", optional=True),
     ),
-    compute=compute,
-    keep=keep,
-    restore=restore,
-    prove=prove,
-    drawing=Drawing("box2d_projected", lines=draw),
+    compute=_compute,
+    keep=_keep,
+    restore=_restore,
+    prove=_prove,
+    drawing=Drawing("box2d_projected", lines=_draw),
 )

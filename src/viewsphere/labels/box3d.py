@@ -24,7 +24,7 @@ METRE_TOLERANCE = 1e-9
 """Tolerance of corners as a share of their distance: rounding errors of float64 are a million times smaller."""
 
 
-def fields(placement: Placement) -> Mapping[str, Any]:
+def _fields(placement: Placement) -> Mapping[str, Any]:
     """The model's box in world axes, in camera axes, and projected."""
     in_world = transform(placement.world_from_object, placement.box)
     in_camera = transform(placement.camera_from_world, in_world)
@@ -38,7 +38,7 @@ def fields(placement: Placement) -> Mapping[str, Any]:
     }
 
 
-def prove(sample: Sample, models: Models) -> Iterator[str]:
+def _prove(sample: Sample, models: Models) -> Iterator[str]:
     """The boxes are the model's, moved by the poses and projected by P (or the lens)."""
     if sample.known_camera is None:
         return
@@ -73,7 +73,7 @@ def _projected(sample: Sample, o: ObjectAnnotation) -> Iterator[str]:
         yield f"object {o.id}: box3d_pixels is up to {np.nanmax(off, initial=0):.3g} px off P x vertex"
 
 
-def draw(pen: ImageDraw, sample: Sample, scale: float) -> None:
+def _draw(pen: ImageDraw, sample: Sample, scale: float) -> None:
     """Every object's box, its front face filled, in a darker tone of its colour."""
     for o in sample.objects:
         red, green, blue = (int(0.55 * c) for c in color_of(o.id))
@@ -87,7 +87,7 @@ def draw(pen: ImageDraw, sample: Sample, scale: float) -> None:
 _EIGHT = "vertices, ordered as in `viewsphere.geometry.box3d`"
 
 LABEL = ObjectLabel.from_placement(
-    fields,
+    _fields,
     name="box3d",
     meaning="its tight box along its own axes",
     fields=(
@@ -97,6 +97,6 @@ LABEL = ObjectLabel.from_placement(
         Field("box3d_pixels", f"{_EIGHT}; NaN where the lens does not show one", float, (8, 2), "px", "image", is_array=True),
         Field("box3d_in_front", "whether a vertex is in front of the camera", bool, (8,), is_array=True),
     ),
-    prove=prove,
-    drawing=Drawing("boxes3d", lines=draw),
+    prove=_prove,
+    drawing=Drawing("boxes3d", lines=_draw),
 )

@@ -30,7 +30,7 @@ ROUNDED = 1e-6
 """Tolerated difference between the entries of a stored canonical pose and the recomputed ones."""
 
 
-def fields(placement: Placement) -> Mapping[str, Any]:
+def _fields(placement: Placement) -> Mapping[str, Any]:
     """The pose in camera, followed by the symmetry that brings its rotation nearest to the identity.
 
     G. Pitteri et al., On Object Symmetries and 6D Pose Estimation from Images (https://arxiv.org/abs/1908.07640), section 3.
@@ -61,13 +61,13 @@ ORDER = (np.eye(3), *np.eye(9).reshape(9, 3, 3))
 
 def _turned(pose: Float, axes: tuple[Continuous, ...]) -> Float:
     """The pose after the best turn around an axis. A ball, which no rotation changes, gets the identity as its rotation."""
-    if is_ball(axes):
+    if _is_ball(axes):
         offset = np.array(axes[0].offset)
         return rigid(np.eye(3), product(pose[:3, :3], offset[:, None])[:, 0] + pose[:3, 3] - offset)
     return compose(pose, _best_turn(pose[:3, :3], axes[0])) if axes else pose
 
 
-def is_ball(axes: tuple[Continuous, ...]) -> bool:
+def _is_ball(axes: tuple[Continuous, ...]) -> bool:
     """Return whether a model is symmetric around non-parallel axes, and so under every rotation."""
     first = np.array(axes[0].axis) if axes else np.zeros(3)
     return any(float(np.abs(np.cross(first, axis.axis)).max()) > 1e-6 for axis in axes)
@@ -90,7 +90,7 @@ def _best_turn(rotation: Float, around: Continuous) -> Float:
     return rigid(turn, offset - product(turn, offset[:, None])[:, 0])
 
 
-def prove(sample: Sample, models: Models) -> Iterator[str]:
+def _prove(sample: Sample, models: Models) -> Iterator[str]:
     """The canonical pose is rigid, no farther from the identity than the pose, and follows from the model's symmetries."""
     for o in rendered(sample):
         pose, turn = o.canonical_pose, o.canonical_pose[:3, :3]
@@ -111,14 +111,14 @@ def _again(o: ObjectAnnotation, symmetries: Symmetries) -> Float:
     return nearest(o.camera_from_object, symmetries)
 
 
-def draw(pen: ImageDraw, sample: Sample, scale: float) -> None:
+def _draw(pen: ImageDraw, sample: Sample, scale: float) -> None:
     """The axes of the canonical pose."""
     for o in sample.objects:
         axes(pen, sample, scale, o.canonical_pose, (o.diameter or 1.0) / 3)
 
 
 LABEL = ObjectLabel.from_placement(
-    fields,
+    _fields,
     name="canonical_pose",
     meaning="one pose for all that look the same",
     axes="object to camera",
@@ -133,6 +133,6 @@ LABEL = ObjectLabel.from_placement(
         ),
         Field("diameter", "the largest distance between two vertices of its model", float, (), "m", "object", optional=True),
     ),
-    prove=prove,
-    drawing=Drawing("canonical_pose", lines=draw, key=(("canonical_pose: x red, y green, z blue", None),)),
+    prove=_prove,
+    drawing=Drawing("canonical_pose", lines=_draw, key=(("canonical_pose: x red, y green, z blue", None),)),
 )

@@ -96,7 +96,7 @@ class Captions(Frozen):
 
 
 @dataclass(frozen=True, eq=False)
-class Seen:
+class _Seen:
     """The facts that captions may state about a picture. These are the objects in the captions, the words for their appearance
     by their ids, and the objects that have a front. Also: the picture's size, the surroundings, and things that fall or hang
     in the air.
@@ -128,7 +128,7 @@ class Seen:
         return listing(self.groups, self.plurals)
 
 
-def compute(context: LabelContext, objects: Sequence[ObjectAnnotation]) -> Mapping[str, Any]:
+def _compute(context: LabelContext, objects: Sequence[ObjectAnnotation]) -> Mapping[str, Any]:
     """The sentences of a picture; none for a LiDAR's."""
     options, scenery, names = context.options_of("captions", Captions), context.get(ShotAppearance()), context.get(Randomness())
     if scenery is None or names is None:
@@ -140,12 +140,12 @@ def compute(context: LabelContext, objects: Sequence[ObjectAnnotation]) -> Mappi
     return {"captions": tuple(found)}
 
 
-def _seen(context: LabelContext, scenery: Scenery, objects: Sequence[ObjectAnnotation], options: Captions) -> Seen:
+def _seen(context: LabelContext, scenery: Scenery, objects: Sequence[ObjectAnnotation], options: Captions) -> _Seen:
     told = [o for o in objects if is_told(o, options.min_visibility)]
     fronts = frozenset(o.id for o in told if has_front(context.placement(o.id - 1).facts))
     weather, sun_is_low = _weather(scenery)
     size = context.camera.width, context.camera.height
-    return Seen(
+    return _Seen(
         told, words_of(context), fronts, size, weather, sun_is_low, _surroundings(context), options.plurals, _air(scenery)
     )
 
@@ -178,7 +178,7 @@ def _surroundings(context: LabelContext) -> str:
     return listed([words for name, words in SURROUNDINGS.items() if pixels[STUFF_IDS[name]] >= SEEN_STUFF * classes.size])
 
 
-def _sentences(seen: Seen, most: int, rng: Rng) -> list[Caption]:
+def _sentences(seen: _Seen, most: int, rng: Rng) -> list[Caption]:
     """A sentence of counts, and other sentences, whose forms alternate."""
     ids = tuple(o.id for o in seen.told)
     if not ids:
@@ -195,10 +195,10 @@ def _sentences(seen: Seen, most: int, rng: Rng) -> list[Caption]:
     return found
 
 
-def _of_one(form: str) -> Callable[[Seen, Rng], Sentences]:
+def _of_one(form: str) -> Callable[[_Seen, Rng], Sentences]:
     """The function that makes a form's sentences about single objects."""
 
-    def sentences(seen: Seen, rng: Rng) -> Sentences:
+    def sentences(seen: _Seen, rng: Rng) -> Sentences:
         for i in rng.permutation(len(seen.told)).tolist():
             o = seen.told[i]
             if said := of_one(form, o, seen.size, o.id in seen.fronts):
@@ -207,13 +207,13 @@ def _of_one(form: str) -> Callable[[Seen, Rng], Sentences]:
     return sentences
 
 
-def _phrase(seen: Seen, o: ObjectAnnotation, rng: Rng) -> tuple[str, Words]:
+def _phrase(seen: _Seen, o: ObjectAnnotation, rng: Rng) -> tuple[str, Words]:
     """A random noun phrase of an object, and its words for appearance."""
     known = list(phrases(o, seen.words[o.id]))
     return known[int(rng.integers(len(known)))]
 
 
-def _relations(seen: Seen, rng: Rng) -> Sentences:
+def _relations(seen: _Seen, rng: Rng) -> Sentences:
     """For each pair of objects, in both orders, one of the relations that hold."""
     count = len(seen.told)
     for i, j in (divmod(pair, count) for pair in rng.permutation(count * count).tolist()):
@@ -225,7 +225,7 @@ def _relations(seen: Seen, rng: Rng) -> Sentences:
             yield Caption(text, "relation", (one.id, other.id))
 
 
-def _of_sky(seen: Seen, rng: Rng) -> Sentences:
+def _of_sky(seen: _Seen, rng: Rng) -> Sentences:
     if seen.weather:
         yield Caption(f"The sky is {seen.weather}.", "weather")
     if seen.sun_is_low:
@@ -233,7 +233,7 @@ def _of_sky(seen: Seen, rng: Rng) -> Sentences:
     yield from (Caption(f"It is {word}.", "weather") for word in seen.air)
 
 
-def _of_surroundings(seen: Seen, rng: Rng) -> Sentences:
+def _of_surroundings(seen: _Seen, rng: Rng) -> Sentences:
     if seen.surroundings:
         yield Caption(f"The picture also shows {seen.surroundings}.", "surroundings")
 
@@ -241,7 +241,7 @@ def _of_surroundings(seen: Seen, rng: Rng) -> Sentences:
 FORMS = (*map(_of_one, ONE), _relations, _of_sky, _of_surroundings)
 
 
-def _by_templates(seen: Seen, options: Captions, rng: Rng) -> list[Caption]:
+def _by_templates(seen: _Seen, options: Captions, rng: Rng) -> list[Caption]:
     """The user's sentences, filled in."""
     found, waiting = list[Caption](), {template: _filled(template, seen, rng) for template in options.templates}
     while waiting and len(found) < options.count:
@@ -254,7 +254,7 @@ def _by_templates(seen: Seen, options: Captions, rng: Rng) -> list[Caption]:
     return found
 
 
-def _filled(template: str, seen: Seen, rng: Rng) -> Sentences:
+def _filled(template: str, seen: _Seen, rng: Rng) -> Sentences:
     """A template, filled in for each object that has a word for all of its fields, in random order. A template without fields
     of objects is filled in once.
     """
@@ -270,7 +270,7 @@ def _filled(template: str, seen: Seen, rng: Rng) -> Sentences:
             yield Caption(capital(whole.text(template)), "template", ids)
 
 
-def _of_picture(seen: Seen) -> dict[str, str]:
+def _of_picture(seen: _Seen) -> dict[str, str]:
     nouns = [noun if n == 1 else plural(noun, seen.plurals) for noun, n in seen.groups]
     return {
         "count": number(len(seen.told)),
@@ -281,7 +281,7 @@ def _of_picture(seen: Seen) -> dict[str, str]:
     }
 
 
-def _of_object(seen: Seen, i: int, rng: Rng, is_related: bool) -> tuple[dict[str, str], tuple[int, ...]]:
+def _of_object(seen: _Seen, i: int, rng: Rng, is_related: bool) -> tuple[dict[str, str], tuple[int, ...]]:
     """The words for an object's fields, and the ids of the objects that they describe."""
     o = seen.told[i]
     noun, (color, material) = noun_of(o.category), seen.words[o.id]
@@ -307,7 +307,7 @@ def _of_object(seen: Seen, i: int, rng: Rng, is_related: bool) -> tuple[dict[str
     return {**words, "relation": relation}, (o.id, seen.told[j].id)
 
 
-def prove(sample: Sample, models: Models) -> Iterator[str]:
+def _prove(sample: Sample, models: Models) -> Iterator[str]:
     """Sentences differ and name visible objects; their statements agree with the sample's other labels. Colours and materials
     are checked if the sample has `looks`.
     """
@@ -327,7 +327,7 @@ def prove(sample: Sample, models: Models) -> Iterator[str]:
             yield f"{one.text!r:.80}: expected {problem}"
 
 
-def beside(sample: Sample) -> Picture:
+def _beside(sample: Sample) -> Picture:
     """The sentences, one below another."""
     return written([one.text for one in sample.captions], sample.width, sample.height)
 
@@ -347,7 +347,7 @@ LABEL = SampleLabel(
             ids={"object": in_attributes("objects")},
         ),
     ),
-    compute=compute,
-    prove=prove,
-    drawing=Drawing("captions", beside=beside),
+    compute=_compute,
+    prove=_prove,
+    drawing=Drawing("captions", beside=_beside),
 )

@@ -12,7 +12,7 @@ from viewsphere.labels.shared.spec import ChannelLabel, Drawing, Models, channel
 from viewsphere.model.sample import Sample
 
 
-def prove(sample: Sample, models: Models) -> Iterator[str]:
+def _prove(sample: Sample, models: Models) -> Iterator[str]:
     """The map contains the categories of the objects in the instance map."""
     instances, categories = channel_of(sample, "instances"), channel_of(sample, "categories")
     if instances is None or categories is None:
@@ -32,7 +32,7 @@ LABEL = ChannelLabel(
     unit="category id",
     encoding="png16",
     compute=lambda context: context.per_triangle(context.geometry.triangle_category, 0),
-    prove=prove,
+    prove=_prove,
     ids={"category": by_table},
     drawing=Drawing("categories", pixels=lambda picture, sample: by_number(picture, sample.channels["categories"])),
 )

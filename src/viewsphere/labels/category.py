@@ -12,13 +12,13 @@ from viewsphere.labels.shared.spec import Drawing, Field, Models, ObjectLabel, r
 from viewsphere.model.sample import Sample
 
 
-def fields(placement: Placement) -> Mapping[str, Any]:
+def _fields(placement: Placement) -> Mapping[str, Any]:
     """The category from the model's entry in the recipe."""
     spec = placement.spec
     return {"category": spec.category, "supercategory": spec.supercategory, "category_id": spec.category_id}
 
 
-def prove(sample: Sample, models: Models) -> Iterator[str]:
+def _prove(sample: Sample, models: Models) -> Iterator[str]:
     """Objects have the categories of their models."""
     for o in rendered(sample):
         facts = models.get(o.key)
@@ -30,7 +30,7 @@ def prove(sample: Sample, models: Models) -> Iterator[str]:
 
 
 LABEL = ObjectLabel.from_placement(
-    fields,
+    _fields,
     name="category",
     meaning="what kind of thing it is",
     fields=(
@@ -38,6 +38,6 @@ LABEL = ObjectLabel.from_placement(
         Field("supercategory", "name of what the category belongs to; may be empty", str),
         Field("category_id", "number of the category, from 1", int, ids={"category": by_number}),
     ),
-    prove=prove,
+    prove=_prove,
     drawing=Drawing("category", lines=notes(lambda o: o.category)),
 )

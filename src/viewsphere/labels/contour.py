@@ -18,14 +18,14 @@ if TYPE_CHECKING:
     from PIL.ImageDraw import ImageDraw
 
 
-def restore(kept: None, placement: Placement, o: ObjectAnnotation) -> Mapping[str, Any]:
+def _restore(kept: None, placement: Placement, o: ObjectAnnotation) -> Mapping[str, Any]:
     """Outlines and hull, from the corners of the mask's pixels."""
     mask = o.mask
     hull = convex_hull(mask_outline(mask)) if mask.any() else np.empty((0, 2))
     return {"contour": tuple(np.array(ring).reshape(-1, 2) for ring in o.polygons), "hull": hull}
 
 
-def prove(sample: Sample, models: Models) -> Iterator[str]:
+def _prove(sample: Sample, models: Models) -> Iterator[str]:
     """Outlines enclose the area of the mask; the hull is convex, encloses no less, and reaches the box's sides."""
     for o in rendered(sample):
         enclosed = sum(_area(ring) for ring in o.contour)
@@ -47,7 +47,7 @@ def _area(ring: Any) -> float:
     return float(x @ np.roll(y, -1) - y @ np.roll(x, -1)) / 2
 
 
-def draw(pen: ImageDraw, sample: Sample, scale: float) -> None:
+def _draw(pen: ImageDraw, sample: Sample, scale: float) -> None:
     """Outlines and hulls in the colours of their objects."""
     for o in sample.objects:
         for ring in (*o.contour, o.hull):
@@ -71,7 +71,7 @@ LABEL = ObjectLabel(
         ),
         Field("hull", "corners of the convex hull, clockwise as seen", float, (-1, 2), "px", is_array=True),
     ),
-    restore=restore,
-    prove=prove,
-    drawing=Drawing("contour", lines=draw),
+    restore=_restore,
+    prove=_prove,
+    drawing=Drawing("contour", lines=_draw),
 )

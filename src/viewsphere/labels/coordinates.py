@@ -18,7 +18,7 @@ TOLERANCE = 1e-5
 """Share of an object's size by which float32 coordinates may be outside its box."""
 
 
-def compute(context: LabelContext) -> NDArray[np.float32]:
+def _compute(context: LabelContext) -> NDArray[np.float32]:
     """The seen point in its object's axes, (H, W, 3) metres; NaN on scenery, on ground, and where nothing is seen."""
     from viewsphere.truth.raster import kernels_channels as kernels
 
@@ -28,7 +28,7 @@ def compute(context: LabelContext) -> NDArray[np.float32]:
     return out
 
 
-def prove(sample: Sample, models: Models) -> Iterator[str]:
+def _prove(sample: Sample, models: Models) -> Iterator[str]:
     """Points lie in their objects' boxes; the background has no coordinates."""
     points, instances = channel_of(sample, "coordinates"), channel_of(sample, "instances")
     if points is None or instances is None:
@@ -44,7 +44,7 @@ def prove(sample: Sample, models: Models) -> Iterator[str]:
             yield f"object {o.id}: expected points in its box, found {outside} outside"
 
 
-def picture(sample: Sample) -> Picture:
+def _picture(sample: Sample) -> Picture:
     """The points as a picture (H, W, 3) uint8. From one side of their object's box to the other, red grows with x, green with y
     and blue with z. Pixels without a point are black.
     """
@@ -65,11 +65,11 @@ LABEL = ChannelLabel(
     components=3,
     unit="m",
     empty=np.nan,
-    compute=compute,
-    prove=prove,
+    compute=_compute,
+    prove=_prove,
     drawing=Drawing(
         "coordinates",
-        beside=picture,
+        beside=_picture,
         key=(("coordinates: across its box red goes with the object's x, green with y, blue with z", None),),
     ),
 )

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from viewsphere.labels.shared.context import LabelContext
 
 
-def along_axis(context: LabelContext) -> NDArray[np.float32]:
+def _along_axis(context: LabelContext) -> NDArray[np.float32]:
     """z of the seen point, (H, W) metres, infinite where nothing is seen; negative behind the image plane of a fisheye."""
     from viewsphere.truth.raster import kernels_channels as kernels
 
@@ -26,7 +26,7 @@ def along_axis(context: LabelContext) -> NDArray[np.float32]:
     return out
 
 
-def prove_depth(sample: Sample, models: Models) -> Iterator[str]:
+def _prove_depth(sample: Sample, models: Models) -> Iterator[str]:
     """Depth is in metres, and finite wherever an object is seen."""
     depth, instances = channel_of(sample, "depth"), channel_of(sample, "instances")
     if depth is None:
@@ -37,7 +37,7 @@ def prove_depth(sample: Sample, models: Models) -> Iterator[str]:
         yield f"expected metres where an object is seen; found infinity at {np.isinf(depth[instances > 0]).sum()} pixels"
 
 
-def along_ray(context: LabelContext) -> NDArray[np.float32]:
+def _along_ray(context: LabelContext) -> NDArray[np.float32]:
     """Distance from the camera's centre to the seen point, (H, W) metres, infinite where nothing is seen.
 
     It is the length of the pixel's ray times 1/s of `truth.raster.visibility`. It is never negative, even behind a fisheye.
@@ -49,7 +49,7 @@ def along_ray(context: LabelContext) -> NDArray[np.float32]:
     return out
 
 
-def prove_depth_ray(sample: Sample, models: Models) -> Iterator[str]:
+def _prove_depth_ray(sample: Sample, models: Models) -> Iterator[str]:
     """Distances are above 0, and finite where depth is. The values are not compared, because depth may be stored in steps."""
     distance, depth = channel_of(sample, "depth_ray"), channel_of(sample, "depth")
     if distance is None:
@@ -82,6 +82,6 @@ def _label(name: str, compute: Callable[[LabelContext], Array], meaning: str, pr
 
 
 LABELS = (
-    _label("depth", along_axis, "distance along the camera's z axis", prove_depth),
-    _label("depth_ray", along_ray, "distance from the camera's centre, along the pixel's ray", prove_depth_ray),
+    _label("depth", _along_axis, "distance along the camera's z axis", _prove_depth),
+    _label("depth_ray", _along_ray, "distance from the camera's centre, along the pixel's ray", _prove_depth_ray),
 )

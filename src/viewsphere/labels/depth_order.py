@@ -34,7 +34,7 @@ class Overlap:
     nearer: float
 
 
-def compute(context: LabelContext, i: int) -> Mapping[str, Any]:
+def _compute(context: LabelContext, i: int) -> Mapping[str, Any]:
     """The objects that overlap with the one of id i + 1, in the order of their ids.
 
     The pairwise orders of amodal data sets: Y. Zhu et al., https://arxiv.org/abs/1509.01329; H. Lee and J. Park, InstaOrder,
@@ -63,12 +63,12 @@ def _overlap(own: IsolatedMask, other: IsolatedMask, id: int) -> Overlap | None:
     return Overlap(id, pixels, int(np.count_nonzero((mine > others) & both)) / pixels) if pixels else None
 
 
-def restore(kept: Any, placement: Placement, o: ObjectAnnotation) -> Mapping[str, Any]:
+def _restore(kept: Any, placement: Placement, o: ObjectAnnotation) -> Mapping[str, Any]:
     """The field, from lists of its numbers."""
     return {"overlaps": tuple(Overlap(id, pixels, nearer) for id, pixels, nearer in kept or ())}
 
 
-def prove(sample: Sample, models: Models) -> Iterator[str]:
+def _prove(sample: Sample, models: Models) -> Iterator[str]:
     """Overlaps are mutual and match the amodal masks where these are stored; the two shares add up to at most 1."""
     by_id = {o.id: o for o in rendered(sample)}
     for o in by_id.values():
@@ -95,7 +95,7 @@ def _mask(o: ObjectAnnotation) -> Any:
     return decode_rle(o.amodal.height, o.amodal.width, o.amodal.counts)
 
 
-def draw(pen: ImageDraw, sample: Sample, scale: float) -> None:
+def _draw(pen: ImageDraw, sample: Sample, scale: float) -> None:
     """An arrow from each object to the overlapping objects that are mostly behind it."""
     by_id = {o.id: o for o in sample.objects}
     for o in sample.objects:
@@ -122,9 +122,9 @@ LABEL = ObjectLabel(
             ids={"object": in_attributes("id")},
         ),
     ),
-    compute=compute,
+    compute=_compute,
     keep=lambda o: [[one.id, one.pixels, one.nearer] for one in o.overlaps] or None,
-    restore=restore,
-    prove=prove,
-    drawing=Drawing("depth_order", lines=draw, key=(("depth_order: arrows lead from the nearer object", None),)),
+    restore=_restore,
+    prove=_prove,
+    drawing=Drawing("depth_order", lines=_draw, key=(("depth_order: arrows lead from the nearer object", None),)),
 )

@@ -57,7 +57,7 @@ class Options(Frozen):
     seed: Natural = Limits(default=0, description="what chance follows from; default: the recipe's seed")
 
 
-def compute(context: LabelContext) -> NDArray[np.float32]:
+def _compute(context: LabelContext) -> NDArray[np.float32]:
     """Measured z-depth, (H, W) metres, infinite where the sensor measures nothing.
 
     C. Nguyen, S. Izadi, D. Lovell, Modeling Kinect Sensor Noise for Improved 3D Reconstruction and Tracking, 3DIMPVT 2012:
@@ -146,14 +146,14 @@ def _quantile(share: float) -> float:
     return NormalDist().inv_cdf(share)
 
 
-def prove(sample: Sample, models: Models) -> Iterator[str]:
+def _prove(sample: Sample, models: Models) -> Iterator[str]:
     """Measured depths are metres above 0, or infinite."""
     measured = channel_of(sample, "depth_sensor")
     if measured is not None and not (measured > 0).all():
         yield "expected metres above 0, or infinity where nothing is measured; found others"
 
 
-def beside(sample: Sample) -> Picture:
+def _beside(sample: Sample) -> Picture:
     """Near is bright; holes are black."""
     measured = sample.channels["depth_sensor"]
     known = measured[np.isfinite(measured)]
@@ -172,7 +172,7 @@ LABEL = ChannelLabel(
     dtype=np.float32,
     unit="m",
     empty=np.inf,
-    compute=compute,
-    prove=prove,
-    drawing=Drawing("depth_sensor", beside=beside, key=(("depth_sensor: near is bright, holes are black", None),)),
+    compute=_compute,
+    prove=_prove,
+    drawing=Drawing("depth_sensor", beside=_beside, key=(("depth_sensor: near is bright, holes are black", None),)),
 )

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from viewsphere.labels.shared.context import LabelContext
 
 
-def compute(context: LabelContext) -> NDArray[np.float32]:
+def _compute(context: LabelContext) -> NDArray[np.float32]:
     """fx baseline / z, (H, W) pixels, positive in both pictures of the pair; 0 for the sky.
 
     The other picture is from the first sensor of the rig that is rectified with the picture's own. NaN without such a sensor,
@@ -32,7 +32,7 @@ def compute(context: LabelContext) -> NDArray[np.float32]:
     return out
 
 
-def prove(sample: Sample, models: Models) -> Iterator[str]:
+def _prove(sample: Sample, models: Models) -> Iterator[str]:
     """Disparity is never negative, and 0 at infinite depth."""
     disparity, depth = channel_of(sample, "disparity"), channel_of(sample, "depth")
     if disparity is None:
@@ -49,7 +49,7 @@ def extent(disparity: NDArray[np.float32]) -> Extent:
     return (0.0, 0.0) if not known.size else (float(np.percentile(known, 2)), float(known.max()))
 
 
-def picture(disparity: NDArray[np.float32], within: Extent | None = None) -> Picture:
+def _picture(disparity: NDArray[np.float32], within: Extent | None = None) -> Picture:
     """Disparity as a picture (H, W, 3): near is light, far is dark, NaN black."""
     known = np.isfinite(disparity)
     grey = np.zeros(disparity.shape, np.float64)
@@ -66,11 +66,11 @@ LABEL = ChannelLabel(
     dtype=np.float32,
     unit="px",
     empty=np.nan,
-    compute=compute,
-    prove=prove,
+    compute=_compute,
+    prove=_prove,
     drawing=Drawing(
         "disparity",
-        within=lambda sample, within: picture(sample.channels["disparity"], within),
+        within=lambda sample, within: _picture(sample.channels["disparity"], within),
         extent=lambda sample: extent(sample.channels["disparity"]),
         key=(("disparity: light is near", None),),
     ),

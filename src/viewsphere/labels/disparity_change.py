@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from viewsphere.labels.shared.context import LabelContext
 
 
-def compute(context: LabelContext) -> NDArray[np.float32]:
+def _compute(context: LabelContext) -> NDArray[np.float32]:
     """The same point's disparity an instant later minus its disparity now, (H, W) pixels; 0 for the sky.
 
     NaN where the point is then behind the camera or gone, and without a rectified sensor or a later instant.
@@ -32,24 +32,24 @@ def compute(context: LabelContext) -> NDArray[np.float32]:
     return out
 
 
-def prove(sample: Sample, models: Models) -> Iterator[str]:
+def _prove(sample: Sample, models: Models) -> Iterator[str]:
     """Disparity is not negative after the change, either."""
     change, now = channel_of(sample, "disparity_change"), channel_of(sample, "disparity")
     if change is not None and now is not None and (now + change < -1e-3 * np.maximum(np.abs(change), 1)).any():
         yield "expected disparity of at least 0 afterwards; found less"
 
 
-def extent(change: NDArray[np.float32]) -> Extent:
+def _extent(change: NDArray[np.float32]) -> Extent:
     """The magnitude of change that 99 % of the pixels do not exceed, with both signs."""
     known = np.abs(change[np.isfinite(change)])
     most = float(np.percentile(known, 99)) if known.size else 0.0
     return -most, most
 
 
-def picture(change: NDArray[np.float32], within: Extent | None = None) -> Picture:
+def _picture(change: NDArray[np.float32], within: Extent | None = None) -> Picture:
     """A change as a picture (H, W, 3): nearer is red, farther is blue, no change is white, NaN is black."""
     known = np.isfinite(change)
-    most = (within or extent(change))[1]
+    most = (within or _extent(change))[1]
     share = np.clip(np.where(known, change, 0) / max(most, 1e-9), -1, 1)
     other = 255 * (1 - np.abs(share))
     red, blue = np.where(share >= 0, 255, other), np.where(share <= 0, 255, other)
@@ -64,12 +64,12 @@ LABEL = ChannelLabel(
     dtype=np.float32,
     unit="px",
     empty=np.nan,
-    compute=compute,
-    prove=prove,
+    compute=_compute,
+    prove=_prove,
     drawing=Drawing(
         "disparity_change",
-        within=lambda sample, within: picture(sample.channels["disparity_change"], within),
-        extent=lambda sample: extent(sample.channels["disparity_change"]),
+        within=lambda sample, within: _picture(sample.channels["disparity_change"], within),
+        extent=lambda sample: _extent(sample.channels["disparity_change"]),
         key=(("comes nearer", (255, 0, 0)), ("goes farther", (0, 0, 255))),
     ),
 )

@@ -25,20 +25,20 @@ TOLERANCE = 1e-9
 """Tolerance of a rotation's entries: rounding errors of float64 are a million times smaller."""
 
 
-def compute(context: LabelContext, objects: Sequence[ObjectAnnotation]) -> Mapping[str, Any]:
+def _compute(context: LabelContext, objects: Sequence[ObjectAnnotation]) -> Mapping[str, Any]:
     """The relative poses, as odometry measures them."""
     found = (context.get(Poses(-1)), context.get(Poses(1)))
-    before, after = (None if moment is None else relative(context.camera, moment.camera) for moment in found)
+    before, after = (None if moment is None else _relative(context.camera, moment.camera) for moment in found)
     return {"camera_from_previous": before, "camera_from_next": after}
 
 
-def relative(to: Camera, of: Camera) -> Any:
+def _relative(to: Camera, of: Camera) -> Any:
     """The rigid matrix (4, 4) from the axes of one camera to those of another."""
     world_from_other = rigid(of.R.T, of.center)
     return compose(rigid(to.R, to.t), world_from_other)
 
 
-def prove(sample: Sample, models: Models) -> Iterator[str]:
+def _prove(sample: Sample, models: Models) -> Iterator[str]:
     """Both poses are rigid, and at least one exists: a sequence has two instants or more."""
     known = [pose for pose in (sample.camera_from_previous, sample.camera_from_next) if pose is not None]
     for pose in known:
@@ -47,16 +47,16 @@ def prove(sample: Sample, models: Models) -> Iterator[str]:
             yield f"expected a rigid pose, found {pose.tolist()}"
 
 
-def draw(pen: ImageDraw, sample: Sample, scale: float) -> None:
+def _draw(pen: ImageDraw, sample: Sample, scale: float) -> None:
     """A small map in the lower left corner: the camera now, before and after, with its distances and turns."""
     before, after = sample.camera_from_previous, sample.camera_from_next
     moved = after if after is not None else before
-    words = "" if moved is None else f"{np.linalg.norm(moved[:3, 3]):.3g} m {turned_deg(moved):.3g}\u00b0"
+    words = "" if moved is None else f"{np.linalg.norm(moved[:3, 3]):.3g} m {_turned_deg(moved):.3g}\u00b0"
     poses = [(pose, color) for pose, color in ((before, PREVIOUS), (np.eye(4), OWN), (after, NEXT)) if pose is not None]
     inset(pen, sample, scale, poses, words, path=True)
 
 
-def turned_deg(pose: Any) -> float:
+def _turned_deg(pose: Any) -> float:
     """The angle of a rigid matrix's rotation."""
     return math.degrees(float(np.linalg.norm(rotation_vector(pose[:3, :3]))))
 
@@ -74,11 +74,11 @@ LABEL = SampleLabel(
         ),
         Field("camera_from_next", "the same for the instant after; None at its end", float, (4, 4), "m", "", True, True),
     ),
-    compute=compute,
-    prove=prove,
+    compute=_compute,
+    prove=_prove,
     drawing=Drawing(
         "ego_motion",
-        lines=draw,
+        lines=_draw,
         key=(
             ("ego_motion: the camera from above, and what lies between two instants", None),
             ("before", PREVIOUS),

@@ -22,7 +22,7 @@ EDGE = 1e-3
 """Pixels from the picture's border within which rounding of stored flow decides whether the flow leads outside."""
 
 
-def flow(context: LabelContext, to: Next | Previous) -> NDArray[np.float32]:
+def _flow(context: LabelContext, to: Next | Previous) -> NDArray[np.float32]:
     """Return the motion of each seen point to another instant, (H, W, 2) pixels, right and down.
 
     NaN where the point has no pixel at that instant: behind the camera, on an absent thing, on a flat picture.
@@ -71,7 +71,7 @@ def _label(name: str, to: Next | Previous, when: str) -> ChannelLabel:
         components=2,
         unit="px",
         empty=np.nan,
-        compute=lambda context: flow(context, to),
+        compute=lambda context: _flow(context, to),
         prove=prove,
         drawing=drawing(name),
     )

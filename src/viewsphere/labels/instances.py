@@ -12,7 +12,7 @@ from viewsphere.labels.shared.spec import ChannelLabel, Drawing, Models, channel
 from viewsphere.model.sample import Sample
 
 
-def prove(sample: Sample, models: Models) -> Iterator[str]:
+def _prove(sample: Sample, models: Models) -> Iterator[str]:
     """The map contains only ids of the sample's objects."""
     instances = channel_of(sample, "instances")
     if instances is None or not instances.size:
@@ -31,6 +31,6 @@ LABEL = ChannelLabel(
     encoding="png16",
     ids={"object": by_table},
     compute=lambda context: context.instances.ids,
-    prove=prove,
+    prove=_prove,
     drawing=Drawing("instances", pixels=lambda picture, sample: by_number(picture, sample.channels["instances"])),
 )

@@ -47,7 +47,7 @@ class Options(Frozen):
     )
 
 
-def compute(context: LabelContext, i: int) -> Mapping[str, Any]:
+def _compute(context: LabelContext, i: int) -> Mapping[str, Any]:
     """Return every field of the object's points, in the order of its model's points; a model without points gives empty
     fields.
     """
@@ -101,7 +101,7 @@ def _fields(placement: Placement, states: Any) -> Mapping[str, Any]:
     }
 
 
-def restore(kept: Any, placement: Placement, o: ObjectAnnotation) -> Mapping[str, Any]:
+def _restore(kept: Any, placement: Placement, o: ObjectAnnotation) -> Mapping[str, Any]:
     """Return every field, computed from the stored states."""
     found = _fields(placement, kept or ())
     if len(found["keypoint_states"]) != len(found["keypoints"]):
@@ -109,7 +109,7 @@ def restore(kept: Any, placement: Placement, o: ObjectAnnotation) -> Mapping[str
     return found
 
 
-def prove(sample: Sample, models: Models) -> Iterator[str]:
+def _prove(sample: Sample, models: Models) -> Iterator[str]:
     """Points are the model's, moved by the pose and seen by the camera; those in the picture are visible or occluded."""
     for o in rendered(sample):
         known = models[o.key].keypoints if o.key in models else None
@@ -144,7 +144,7 @@ def _seen(sample: Sample, o: ObjectAnnotation) -> Iterator[str]:
         yield f"object {o.id}: expected states that fit the pixels of its points, found others of {wrong.sum()}"
 
 
-def draw(pen: ImageDraw, sample: Sample, scale: float) -> None:
+def _draw(pen: ImageDraw, sample: Sample, scale: float) -> None:
     """Each object's points in its colour: filled where they are seen, hollow where something hides them."""
     radius = max(2.0, 3.0 * scale * sample.width / 640)
     for o in sample.objects:
@@ -169,9 +169,9 @@ LABEL = ObjectLabel(
         Field("keypoints3d_camera", _EACH, float, (-1, 3), "m", "camera", is_array=True),
         Field("keypoint_states", f"{_EACH}: 0 visible, 1 occluded, 2 outside, 3 behind", int, (-1,), is_array=True, ids={}),
     ),
-    compute=compute,
+    compute=_compute,
     keep=lambda o: o.keypoint_states.tolist() or None,
-    restore=restore,
-    prove=prove,
-    drawing=Drawing("keypoints", lines=draw, key=(("keypoints: filled is visible, hollow is occluded", None),)),
+    restore=_restore,
+    prove=_prove,
+    drawing=Drawing("keypoints", lines=_draw, key=(("keypoints: filled is visible, hollow is occluded", None),)),
 )

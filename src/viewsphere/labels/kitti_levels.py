@@ -29,7 +29,7 @@ UNKNOWN = 3
 """Grade of an object outside the image."""
 
 
-def occlusion(kept: None, placement: Placement, o: ObjectAnnotation) -> Mapping[str, Any]:
+def _occlusion(kept: None, placement: Placement, o: ObjectAnnotation) -> Mapping[str, Any]:
     """The grade for visibility and truncation. It counts only pixels in the image; pixels outside count as KITTI's
     truncation.
     """
@@ -39,7 +39,7 @@ def occlusion(kept: None, placement: Placement, o: ObjectAnnotation) -> Mapping[
     return {"occlusion_level": int(hidden > PARTLY) + int(hidden > LARGELY_HIDDEN)}
 
 
-def prove_occlusion(sample: Sample, models: Models) -> Iterator[str]:
+def _prove_occlusion(sample: Sample, models: Models) -> Iterator[str]:
     """An invisible object is largely occluded or unknown, and a visible one has a known grade."""
     for o in rendered(sample):
         grade, seen = o.occlusion_level, o.mask.any()
@@ -47,12 +47,12 @@ def prove_occlusion(sample: Sample, models: Models) -> Iterator[str]:
             yield f"object {o.id}: expected a grade of 0 to 3 that fits {o.area} visible pixels, found {grade}"
 
 
-def truncation(kept: None, placement: Placement, o: ObjectAnnotation) -> Mapping[str, Any]:
+def _truncation(kept: None, placement: Placement, o: ObjectAnnotation) -> Mapping[str, Any]:
     """The grade for the truncation."""
     return {"truncation_level": int(o.truncation > TRUNCATED) + int(o.truncation > LARGELY_OUTSIDE)}
 
 
-def prove_truncation(sample: Sample, models: Models) -> Iterator[str]:
+def _prove_truncation(sample: Sample, models: Models) -> Iterator[str]:
     """An object with its projected box in the image is not truncated; with its box outside, it is largely truncated."""
     for o in rendered(sample):
         grade, inside = o.truncation_level, o.box2d_projected
@@ -92,16 +92,16 @@ LABELS = (
         "how much others hide of it, in KITTI's grades",
         f"of its pixels in the image are hidden: 0 at most {PARTLY:.0%}, 1 at most {LARGELY_HIDDEN:.0%}, 2 more, or it has "
         "none; 3 all are outside",
-        occlusion,
-        prove_occlusion,
+        _occlusion,
+        _prove_occlusion,
         "1 partly, 2 largely occluded",
     ),
     _label(
         "truncation_level",
         "how much of it lies outside of the image, in KITTI's grades",
         f"outside are: 0 at most {TRUNCATED:.0%}, 1 at most {LARGELY_OUTSIDE:.0%}, 2 more",
-        truncation,
-        prove_truncation,
+        _truncation,
+        _prove_truncation,
         "0 inside, 1 truncated, 2 largely so",
     ),
 )

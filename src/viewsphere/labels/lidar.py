@@ -30,7 +30,7 @@ ROUNDED = 1e-6
 """Share of a point's distance by which float32 may move it."""
 
 
-def compute(context: LabelContext) -> NDArray[np.void]:
+def _compute(context: LabelContext) -> NDArray[np.void]:
     """One row for each returned point, (N,) of `viewsphere.model.sensors.lidar.POINT`, ring by ring. Raises ValueError if the
     sensor is not a LiDAR.
     """
@@ -46,7 +46,7 @@ def compute(context: LabelContext) -> NDArray[np.void]:
     distance = distance + lidar.sigma * draw("range", np.random.Generator.standard_normal) if lidar.sigma else distance
     out = np.empty(len(ring), POINT)
     out["range"], out["incidence"], out["intensity"] = distance, hits.incidence, intensity
-    out["xyz"] = in_lidar_axes(context.rays[ring, column]) * distance[:, None]
+    out["xyz"] = _in_lidar_axes(context.rays[ring, column]) * distance[:, None]
     out["time"] = ((column + 0.5) / width - 0.5) * lidar.sweep
     objects = len(context.geometry.triangle_category)  # their triangles come first
     out["instance"] = context.geometry.triangle_object[hits.triangle]
@@ -91,12 +91,12 @@ def _returns(lidar: Lidar, distance: Float, intensity: Float, draw: Draw) -> NDA
     return np.ones(len(chance), np.bool_) if (chance == 1.0).all() else draw("dropout", np.random.Generator.random) < chance
 
 
-def in_lidar_axes(vectors: Float) -> Float:
+def _in_lidar_axes(vectors: Float) -> Float:
     """Vectors (..., 3) in camera axes (right, down, ahead), converted to a LiDAR's axes (ahead, left, up)."""
     return np.stack([vectors[..., 2], -vectors[..., 0], -vectors[..., 1]], axis=-1)
 
 
-def prove(sample: Sample, models: Models) -> Iterator[str]:
+def _prove(sample: Sample, models: Models) -> Iterator[str]:
     """Each point is on the ray of its ring and column, at its range and on an object of the sample; a ray has one point."""
     rows = channel_of(sample, "lidar")
     if rows is None:
@@ -110,7 +110,7 @@ def prove(sample: Sample, models: Models) -> Iterator[str]:
     if not (np.isfinite(distance) & (distance > 0)).all():
         yield "expected ranges above 0 m; found others"
         return
-    expected = in_lidar_axes(pixel_rays(sample.camera.intrinsics)[ring, column]) * distance[:, None].astype(np.float64)
+    expected = _in_lidar_axes(pixel_rays(sample.camera.intrinsics)[ring, column]) * distance[:, None].astype(np.float64)
     off = np.abs(rows["xyz"] - expected).max(axis=1, initial=0.0) > ROUNDED * distance
     if not np.isfinite(rows["xyz"]).all() or off.any():
         yield f"expected points on the rays of their rings and columns; found {off.sum()} elsewhere"
@@ -142,9 +142,9 @@ LABEL = ChannelLabel(
     unit="m, rad, s",
     empty=np.nan,
     encoding="npz",
-    compute=compute,
+    compute=_compute,
     ids={"category": in_column("category"), "object": in_column("instance")},
-    prove=prove,
+    prove=_prove,
     drawing=Drawing(
         "lidar", stand_in=from_above, key=(("LiDAR from above: objects in their colours, else high is light", None),)
     ),

@@ -21,19 +21,19 @@ if TYPE_CHECKING:
     from viewsphere.labels.shared.context import LabelContext
 
 
-def compute(context: LabelContext, i: int) -> Mapping[str, Any]:
+def _compute(context: LabelContext, i: int) -> Mapping[str, Any]:
     """The words for most of the model's surface, with the shot's materials."""
     color, material = words_of(context)[i + 1]
     return {"color": color or None, "material": material or None}
 
 
-def restore(kept: Any, placement: Placement, o: ObjectAnnotation) -> Mapping[str, Any]:
+def _restore(kept: Any, placement: Placement, o: ObjectAnnotation) -> Mapping[str, Any]:
     """The fields, from a pair of words."""
     color, material = kept or (None, None)
     return {"color": color, "material": material}
 
 
-def prove(sample: Sample, models: Models) -> Iterator[str]:
+def _prove(sample: Sample, models: Models) -> Iterator[str]:
     """Words are printable and short; a model of unknown appearance has none."""
     for o in rendered(sample):
         known = models.get(o.key)
@@ -44,7 +44,7 @@ def prove(sample: Sample, models: Models) -> Iterator[str]:
                 yield f"object {o.id}: expected no word for a model of which no looks are known, found {word!r:.60}"
 
 
-def draw(pen: ImageDraw, sample: Sample, scale: float) -> None:
+def _draw(pen: ImageDraw, sample: Sample, scale: float) -> None:
     """The words, written at every visible object."""
     for o in sample.objects:
         if o.box2d and (o.color or o.material):
@@ -62,9 +62,9 @@ LABEL = ObjectLabel(
         ),
         Field("material", "glass, metal, glossy, matte, or the model's own word; None: none does", str, optional=True),
     ),
-    compute=compute,
+    compute=_compute,
     keep=lambda o: [o.color, o.material] if o.color or o.material else None,
-    restore=restore,
-    prove=prove,
-    drawing=Drawing("looks", lines=draw),
+    restore=_restore,
+    prove=_prove,
+    drawing=Drawing("looks", lines=_draw),
 )

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from viewsphere.labels.shared.context import LabelContext
 
 
-def compute(context: LabelContext, i: int) -> Mapping[str, Any]:
+def _compute(context: LabelContext, i: int) -> Mapping[str, Any]:
     """Run lengths and area of the pixels that show the object."""
     seen, camera = context.instances, context.camera
     area = int(seen.area[i + 1])
@@ -35,7 +35,7 @@ def _nothing(height: int, width: int) -> Rle:
     return Rle(height, width, rle_of_part(height, width, np.zeros((0, 0), np.bool_), 0, 0))
 
 
-def restore(counts: str, placement: Placement, o: ObjectAnnotation) -> Mapping[str, Any]:
+def _restore(counts: str, placement: Placement, o: ObjectAnnotation) -> Mapping[str, Any]:
     """The fields, from the stored run-length code."""
     height, width = placement.camera.height, placement.camera.width
     return {"rle": Rle(height, width, counts), "area": rle_area(height, width, counts)}
@@ -80,7 +80,7 @@ def _foreign(o: ObjectAnnotation, size: tuple[int, int]) -> Iterator[str]:
         yield f"object {o.id}: expected area {area}, found {o.area}"
 
 
-def tinted(picture: Picture, sample: Sample) -> Picture:
+def _tinted(picture: Picture, sample: Sample) -> Picture:
     """The picture with every object in its colour."""
     out = picture.astype(np.float64)
     for o in sample.objects:
@@ -96,9 +96,9 @@ LABEL = ObjectLabel(
         Field("rle", "COCO's compressed run-length code", Rle, ids={}),
         Field("area", "number of visible pixels", int, unit="px", ids={}),
     ),
-    compute=compute,
+    compute=_compute,
     keep=lambda o: o.rle.counts,
-    restore=restore,
+    restore=_restore,
     prove=prove,
-    drawing=Drawing("masks", pixels=tinted),
+    drawing=Drawing("masks", pixels=_tinted),
 )

@@ -26,7 +26,7 @@ def states(context: LabelContext, other: Next | Previous | Partner) -> NDArray[n
     return np.full(context.visibility.triangle.shape, INVALID, np.uint8) if match is None else match.state
 
 
-def drawing(channel: str) -> Drawing:
+def _drawing(channel: str) -> Drawing:
     """Return the drawing of a channel of states beside a picture."""
     colors: list[list[int]] = COLORS.tolist()
     names = (f"{channel}: visible", "occluded", "outside", "behind", "invalid")
@@ -60,7 +60,7 @@ def _label(name: str, where: str, other: Next | Previous | Partner) -> ChannelLa
         encoding="png",
         compute=lambda context: states(context, other),
         prove=prove,
-        drawing=drawing(name),
+        drawing=_drawing(name),
     )
 
 

@@ -11,7 +11,7 @@ from viewsphere.labels.shared.spec import Drawing, Field, Models, ObjectLabel, r
 from viewsphere.model.sample import Sample
 
 
-def fields(placement: Placement) -> Mapping[str, Any]:
+def _fields(placement: Placement) -> Mapping[str, Any]:
     """The model's names."""
     spec, step = placement.spec, placement.step
     if step is None:
@@ -19,7 +19,7 @@ def fields(placement: Placement) -> Mapping[str, Any]:
     return {"key": spec.key_at(step.frame), "model": placement.facts.obj, "track": spec.key}
 
 
-def prove(sample: Sample, models: Models) -> Iterator[str]:
+def _prove(sample: Sample, models: Models) -> Iterator[str]:
     """The object's model is in the data set."""
     for o in rendered(sample):
         facts = models.get(o.key)
@@ -32,7 +32,7 @@ def prove(sample: Sample, models: Models) -> Iterator[str]:
 
 
 LABEL = ObjectLabel.from_placement(
-    fields,
+    _fields,
     name="model",
     meaning="which model it is",
     fields=(
@@ -40,6 +40,6 @@ LABEL = ObjectLabel.from_placement(
         Field("model", "path of the normalised model, relative to the data set's root", str),
         Field("track", "key of the animated model that stays itself over time, else empty", str),
     ),
-    prove=prove,
+    prove=_prove,
     drawing=Drawing("model", lines=notes(lambda o: o.key)),
 )

@@ -12,14 +12,14 @@ from viewsphere.labels.shared.spec import ChannelLabel, Drawing, Models, Proof, 
 from viewsphere.model.sample import Sample
 
 
-def prove_parts(sample: Sample, models: Models) -> Iterator[str]:
+def _prove_parts(sample: Sample, models: Models) -> Iterator[str]:
     """Objects have parts; the background has none."""
     parts, instances = channel_of(sample, "parts"), channel_of(sample, "instances")
     if parts is not None and instances is not None and ((parts > 0) != (instances > 0)).any():
         yield f"expected a part where an object is seen, none elsewhere; found {((parts > 0) != (instances > 0)).sum()} others"
 
 
-def prove_body_parts(sample: Sample, models: Models) -> Iterator[str]:
+def _prove_body_parts(sample: Sample, models: Models) -> Iterator[str]:
     """Only objects have parts, these exist in their models, and a triangle has one part."""
     found, instances = channel_of(sample, "body_parts"), channel_of(sample, "instances")
     if found is None or instances is None:
@@ -38,7 +38,7 @@ def prove_body_parts(sample: Sample, models: Models) -> Iterator[str]:
             yield f"object {o.id}: expected one body part in each triangle, found several in {several}"
 
 
-def prove_materials(sample: Sample, models: Models) -> Iterator[str]:
+def _prove_materials(sample: Sample, models: Models) -> Iterator[str]:
     """Objects have materials of their models, the background has none, and a triangle has one material."""
     materials, instances = channel_of(sample, "materials"), channel_of(sample, "instances")
     if materials is None or instances is None:
@@ -72,20 +72,20 @@ def _label(name: str, meaning: str, unit: str, table: str, prove: Proof) -> Chan
 
 
 LABELS = (
-    _label("parts", "named part of the object's model, from 1; 0 is none", "part id", "triangle_part", prove_parts),
+    _label("parts", "named part of the object's model, from 1; 0 is none", "part id", "triangle_part", _prove_parts),
     _label(
         "body_parts",
         "part of a body, from 1, as `ModelInfo.body_parts` names them: the bone whose skin weights, summed over the "
         "triangle's corners, are largest; 0 is none",
         "part id",
         "triangle_body_part",
-        prove_body_parts,
+        _prove_body_parts,
     ),
     _label(
         "materials",
         "material of the object's model, from 1, in the order of its file and of `ModelInfo.materials`; 0 is none",
         "material id",
         "triangle_material",
-        prove_materials,
+        _prove_materials,
     ),
 )

@@ -28,7 +28,7 @@ JOINED = 0.05
 """Maximum relative difference in 1/s for neighbouring pixels of one thing to count as one surface."""
 
 
-def compute(context: LabelContext) -> NDArray[np.uint8]:
+def _compute(context: LabelContext) -> NDArray[np.uint8]:
     """1 on both sides of a boundary, else 0, (H, W).
 
     A boundary is between two adjacent pixels, side by side or one above the other, whose flows to the next instant differ by
@@ -57,7 +57,7 @@ def _sides(axis: int) -> tuple[tuple[slice, ...], tuple[slice, ...]]:
     return (*before, slice(None, -1)), (*before, slice(1, None))
 
 
-def prove(sample: Sample, models: Models) -> Iterator[str]:
+def _prove(sample: Sample, models: Models) -> Iterator[str]:
     """A boundary has a neighbour that moves differently."""
     boundaries, vectors = channel_of(sample, "motion_boundaries"), channel_of(sample, "flow")
     if boundaries is None or vectors is None:
@@ -73,7 +73,7 @@ def prove(sample: Sample, models: Models) -> Iterator[str]:
         yield f"expected neighbours whose flow differs; found none at {wrong.sum()} pixels"
 
 
-def lined(picture: Picture, sample: Sample) -> Picture:
+def _lined(picture: Picture, sample: Sample) -> Picture:
     """The picture with its boundaries as lines of one colour."""
     return np.where(sample.channels["motion_boundaries"][..., None] > 0, np.array(COLOR, np.uint8), picture)
 
@@ -85,7 +85,7 @@ LABEL = ChannelLabel(
     dtype=np.uint8,
     ids={},
     encoding="png",
-    compute=compute,
-    prove=prove,
-    drawing=Drawing("motion_boundaries", pixels=lined, key=(("motion boundaries", COLOR),)),
+    compute=_compute,
+    prove=_prove,
+    drawing=Drawing("motion_boundaries", pixels=_lined, key=(("motion boundaries", COLOR),)),
 )

@@ -20,7 +20,7 @@ TOLERANCE = 1e-6
 """Amount by which float32 may be outside 0 to 1."""
 
 
-def compute(context: LabelContext) -> NDArray[np.float32]:
+def _compute(context: LabelContext) -> NDArray[np.float32]:
     """Normalised object coordinates (H, W, 3), 0 to 1 in the object's axes; NaN on scenery, on ground, and where nothing is
     seen.
 
@@ -39,7 +39,7 @@ def compute(context: LabelContext) -> NDArray[np.float32]:
     return out
 
 
-def prove(sample: Sample, models: Models) -> Iterator[str]:
+def _prove(sample: Sample, models: Models) -> Iterator[str]:
     """The points, converted from shares to metres, equal `coordinates` and are at their pixels and depth."""
     shares, instances = channel_of(sample, "nocs"), channel_of(sample, "instances")
     if shares is None:
@@ -86,8 +86,8 @@ LABEL = ChannelLabel(
     dtype=np.float32,
     components=3,
     empty=np.nan,
-    compute=compute,
-    prove=prove,
+    compute=_compute,
+    prove=_prove,
     drawing=Drawing(
         "nocs",
         beside=lambda sample: picture(sample.channels["nocs"]),

@@ -18,7 +18,7 @@ TOLERANCE = 1e-5
 """Tolerated difference of a stored float32 direction's length from 1; rounding alone gives about 1e-7."""
 
 
-def shading_normals(context: LabelContext) -> NDArray[np.float32]:
+def _shading_normals(context: LabelContext) -> NDArray[np.float32]:
     """Interpolated vertex normals (H, W, 3) on the visible side of their triangle, bent to at most perpendicular to the ray
     where interpolation turns them away.
     """
@@ -32,7 +32,7 @@ def shading_normals(context: LabelContext) -> NDArray[np.float32]:
     return out
 
 
-def triangle_normals(context: LabelContext) -> NDArray[np.float32]:
+def _triangle_normals(context: LabelContext) -> NDArray[np.float32]:
     """The triangle's normal (H, W, 3) in camera axes, towards the camera; 0 where nothing is seen."""
     from viewsphere.truth.raster import kernels_channels as kernels
 
@@ -54,7 +54,7 @@ def _prove(sample: Sample, name: str) -> Iterator[str]:
         yield f"expected directions of length 1, or 0 where there is none; found others at {wrong.sum()} pixels"
 
 
-def picture(normals: Array) -> Picture:
+def _picture(normals: Array) -> Picture:
     """Normals as a picture (H, W, 3) uint8, as in normal maps: red to the right, green up, blue towards the camera."""
     right, down, away = np.moveaxis(normals.astype(np.float64), -1, 0)
     shares = (np.stack([right, -down, -away], axis=-1) + 1) / 2
@@ -78,13 +78,13 @@ def _label(name: str, compute: Callable[[LabelContext], Array], what: str) -> Ch
         prove=prove,
         drawing=Drawing(
             name,
-            beside=lambda sample: picture(sample.channels[name]),
+            beside=lambda sample: _picture(sample.channels[name]),
             key=((f"{name}: red to the right, green up, blue towards the camera", None),),
         ),
     )
 
 
 LABELS = (
-    _label("normals", shading_normals, "shading"),
-    _label("normals_geometric", triangle_normals, "triangle's"),
+    _label("normals", _shading_normals, "shading"),
+    _label("normals_geometric", _triangle_normals, "triangle's"),
 )

@@ -25,7 +25,7 @@ TOLERANCE = 1e-6
 """Pixels by which rounding may move a corner."""
 
 
-def compute(context: LabelContext, i: int) -> Mapping[str, Any]:
+def _compute(context: LabelContext, i: int) -> Mapping[str, Any]:
     """Both rectangles; the model's only if the lens shows all of its vertices."""
     seen = context.instances
     x0, y0, x1, y1 = seen.box[i + 1].tolist() if seen.area[i + 1] else (0, 0, 0, 0)
@@ -47,7 +47,7 @@ def _around(part: Any, x0: int, y0: int) -> Any:
     return smallest_rectangle(convex_hull(mask_outline(part, x0, y0))) if part.any() else None
 
 
-def restore(kept: Any, placement: Placement, o: ObjectAnnotation) -> Mapping[str, Any]:
+def _restore(kept: Any, placement: Placement, o: ObjectAnnotation) -> Mapping[str, Any]:
     """The rectangle of the mask, and the stored rectangle of the model."""
     if o.box2d is None:
         return {"obb": None, "obb_projected": None if kept is None else np.array(kept, np.float64)}
@@ -56,12 +56,12 @@ def restore(kept: Any, placement: Placement, o: ObjectAnnotation) -> Mapping[str
     return {"obb": around, "obb_projected": None if kept is None else np.array(kept, np.float64)}
 
 
-def keep(o: ObjectAnnotation) -> Any:
+def _keep(o: ObjectAnnotation) -> Any:
     """The model's rectangle; the mask is stored already."""
     return None if o.obb_projected is None else o.obb_projected.tolist()
 
 
-def prove(sample: Sample, models: Models) -> Iterator[str]:
+def _prove(sample: Sample, models: Models) -> Iterator[str]:
     """Rectangles have right angles, hold the visible pixels, touch them on each side, and are no larger than upright boxes."""
     for o in rendered(sample):
         if (o.obb is None) != (o.box2d is None):
@@ -99,7 +99,7 @@ def _tight(corners: Any, points: Any, slack: float) -> Iterator[str]:
             yield f"expected sides at the visible pixels, found them {along.min():.4g} and {along.max() - length:.4g} off"
 
 
-def draw(pen: ImageDraw, sample: Sample, scale: float) -> None:
+def _draw(pen: ImageDraw, sample: Sample, scale: float) -> None:
     """The rectangle of each object's visible pixels, in its colour, and its model's rectangle as a thinner line."""
     for o in sample.objects:
         for corners, width in ((o.obb, 2), (o.obb_projected, 1)):
@@ -123,9 +123,9 @@ LABEL = ObjectLabel(
             *(float, (4, 2), "px", "", True, True),
         ),
     ),
-    compute=compute,
-    keep=keep,
-    restore=restore,
-    prove=prove,
-    drawing=Drawing("obb", lines=draw),
+    compute=_compute,
+    keep=_keep,
+    restore=_restore,
+    prove=_prove,
+    drawing=Drawing("obb", lines=_draw),
 )

@@ -33,7 +33,7 @@ class Occluder:
     share: float
 
 
-def compute(context: LabelContext, i: int) -> Mapping[str, Any]:
+def _compute(context: LabelContext, i: int) -> Mapping[str, Any]:
     """Return the things that are seen at the object's hidden pixels; of several things in front of it, the nearest counts."""
     if context.is_unobstructed(i):
         return {"occluders": ()}
@@ -46,12 +46,12 @@ def compute(context: LabelContext, i: int) -> Mapping[str, Any]:
     return {"occluders": tuple(sorted(found, key=lambda one: (-one.share, one.id)))}
 
 
-def restore(kept: Any, placement: Placement, o: ObjectAnnotation) -> Mapping[str, Any]:
+def _restore(kept: Any, placement: Placement, o: ObjectAnnotation) -> Mapping[str, Any]:
     """The field, from pairs of id and share."""
     return {"occluders": tuple(Occluder(id, share) for id, share in kept or ())}
 
 
-def prove(sample: Sample, models: Models) -> Iterator[str]:
+def _prove(sample: Sample, models: Models) -> Iterator[str]:
     """Shares and the visible share add up to the pixels in the image; each id is of another object, and occurs once."""
     known = {0, *(o.id for o in sample.objects)}
     for o in rendered(sample):
@@ -66,7 +66,7 @@ def prove(sample: Sample, models: Models) -> Iterator[str]:
             yield f"object {o.id}: expected occluders of {hidden:.6f} of it, found {math.fsum(shares):.6f}"
 
 
-def draw(pen: ImageDraw, sample: Sample, scale: float) -> None:
+def _draw(pen: ImageDraw, sample: Sample, scale: float) -> None:
     """An arrow from each object to each of its occluders, with the share as text."""
     by_id = {o.id: o for o in sample.objects}
     for o in sample.objects:
@@ -91,9 +91,9 @@ LABEL = ObjectLabel(
             ids={"object": in_attributes("id")},
         ),
     ),
-    compute=compute,
+    compute=_compute,
     keep=lambda o: [[one.id, one.share] for one in o.occluders] or None,
-    restore=restore,
-    prove=prove,
-    drawing=Drawing("occluders", lines=draw, key=(("occluders: arrows lead to what hides an object", None),)),
+    restore=_restore,
+    prove=_prove,
+    drawing=Drawing("occluders", lines=_draw, key=(("occluders: arrows lead to what hides an object", None),)),
 )

@@ -52,7 +52,7 @@ def object_of(codes: Array) -> Array:
     return codes & MOST[0]
 
 
-def prove(sample: Sample, models: Models) -> Iterator[str]:
+def _prove(sample: Sample, models: Models) -> Iterator[str]:
     """Objects match `instances`, and classes match the objects' categories."""
     codes, instances = channel_of(sample, "panoptic"), channel_of(sample, "instances")
     if codes is None or instances is None:
@@ -68,7 +68,7 @@ def renumbered(codes: Array, ids: Mapping[int, int]) -> Array:
     return with_classes(class_of(codes), ids) << BITS | object_of(codes)
 
 
-def with_objects(codes: Array, ids: Mapping[int, int]) -> Array:
+def _with_objects(codes: Array, ids: Mapping[int, int]) -> Array:
     """The map with new ids for objects."""
     return class_of(codes) << BITS | by_table(object_of(codes), ids)
 
@@ -89,7 +89,7 @@ LABEL = ChannelLabel(
     unit="class and object id",
     empty=SKY << BITS,
     compute=compute,
-    prove=prove,
-    ids={"category": renumbered, "object": with_objects},
+    prove=_prove,
+    ids={"category": renumbered, "object": _with_objects},
     drawing=Drawing("panoptic", beside=lambda sample: picture(sample.channels["panoptic"]), key=KEY),
 )

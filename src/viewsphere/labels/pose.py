@@ -20,7 +20,7 @@ TOLERANCE = 1e-9
 """Tolerance of a pose's entries as a share of their size: rounding errors of float64 are a million times smaller."""
 
 
-def fields(placement: Placement) -> Mapping[str, Any]:
+def _fields(placement: Placement) -> Mapping[str, Any]:
     """The pose in world axes and in camera axes."""
     in_camera = placement.camera_from_object
     return {
@@ -30,7 +30,7 @@ def fields(placement: Placement) -> Mapping[str, Any]:
     }
 
 
-def prove(sample: Sample, models: Models) -> Iterator[str]:
+def _prove(sample: Sample, models: Models) -> Iterator[str]:
     """The pose in camera axes is the pose in world axes, transformed to the camera; the quaternion is its rotation."""
     if sample.known_camera is None:
         return
@@ -44,14 +44,14 @@ def prove(sample: Sample, models: Models) -> Iterator[str]:
             yield f"object {o.id}: the quaternion is not camera_from_object's rotation"
 
 
-def draw(pen: ImageDraw, sample: Sample, scale: float) -> None:
+def _draw(pen: ImageDraw, sample: Sample, scale: float) -> None:
     """Every object's own axes, half as long as its longest side."""
     for o in sample.objects:
         axes(pen, sample, scale, o.camera_from_object, max(o.size) / 2)
 
 
 LABEL = ObjectLabel.from_placement(
-    fields,
+    _fields,
     name="pose",
     meaning="where it is and how it is turned",
     fields=(
@@ -67,6 +67,6 @@ LABEL = ObjectLabel.from_placement(
         ),
         Field("quaternion", "rotation of camera_from_object: (w, x, y, z), w >= 0", float, (4,)),
     ),
-    prove=prove,
-    drawing=Drawing("pose", lines=draw, key=(("pose: x red, y green, z blue", None),)),
+    prove=_prove,
+    drawing=Drawing("pose", lines=_draw, key=(("pose: x red, y green, z blue", None),)),
 )

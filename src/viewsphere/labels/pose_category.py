@@ -12,13 +12,13 @@ from viewsphere.labels.shared.spec import Drawing, Field, Models, ObjectLabel, r
 from viewsphere.model.sample import Sample
 
 
-def fields(placement: Placement) -> Mapping[str, Any]:
+def _fields(placement: Placement) -> Mapping[str, Any]:
     """The named bin of the object's view."""
     view = placement.view
     return {"pose_category": pose_category(view.azimuth_deg, view.elevation_deg, placement.category_deg)}
 
 
-def prove(sample: Sample, models: Models) -> Iterator[str]:
+def _prove(sample: Sample, models: Models) -> Iterator[str]:
     """The category is top or bottom from 60 degrees up or down; otherwise its above or below matches the elevation."""
     for o in rendered(sample):
         elevation, name = round(o.view.elevation_deg, 6), o.pose_category
@@ -31,11 +31,11 @@ def prove(sample: Sample, models: Models) -> Iterator[str]:
 
 
 LABEL = ObjectLabel.from_placement(
-    fields,
+    _fields,
     name="pose_category",
     meaning="which side of it is seen",
     axes="object",
     fields=(Field("pose_category", "named bin: front, front-left, ..., top", str),),
-    prove=prove,
+    prove=_prove,
     drawing=Drawing("pose_category", lines=notes(lambda o: o.pose_category)),
 )

@@ -20,7 +20,7 @@ STRIPES = 2
 """Colours of a picture begin anew so often in a metre, divided by two."""
 
 
-def compute(context: LabelContext) -> NDArray[np.float32]:
+def _compute(context: LabelContext) -> NDArray[np.float32]:
     """The seen point in the world's axes, (H, W, 3) metres, on objects, scenery and ground; NaN where nothing is seen.
 
     It is the pixel's ray from the camera's centre, times 1/s of `truth.raster.visibility`, so it is on that ray and at `depth`.
@@ -34,7 +34,7 @@ def compute(context: LabelContext) -> NDArray[np.float32]:
     return out
 
 
-def prove(sample: Sample, models: Models) -> Iterator[str]:
+def _prove(sample: Sample, models: Models) -> Iterator[str]:
     """Points are at their pixels and depth, and equal the object's coordinates, moved by its pose."""
     points = channel_of(sample, "position")
     if points is None:
@@ -89,8 +89,8 @@ LABEL = ChannelLabel(
     components=3,
     unit="m",
     empty=np.nan,
-    compute=compute,
-    prove=prove,
+    compute=_compute,
+    prove=_prove,
     drawing=Drawing(
         "position",
         beside=lambda sample: striped(sample.channels["position"]),

@@ -184,7 +184,7 @@ def _used(own: Words) -> int:
     return sum(map(bool, own))
 
 
-def compute(context: LabelContext, objects: Sequence[ObjectAnnotation]) -> Mapping[str, Any]:
+def _compute(context: LabelContext, objects: Sequence[ObjectAnnotation]) -> Mapping[str, Any]:
     """The expressions, in the order of the objects' ids; none for a LiDAR's picture."""
     options, scenery = context.options_of("referring", Referring), context.get(ShotAppearance())
     if scenery is None:
@@ -197,7 +197,7 @@ def compute(context: LabelContext, objects: Sequence[ObjectAnnotation]) -> Mappi
     return {"referring": tuple(one for one in found if one)}
 
 
-def prove(sample: Sample, models: Models) -> Iterator[str]:
+def _prove(sample: Sample, models: Models) -> Iterator[str]:
     """Check that each visible object has at most one expression, with all parts in its text.
 
     If the label `looks` gives words for all objects, the expression must single out its object, and a missing expression is an
@@ -241,7 +241,7 @@ def _text(one: Expression, by_id: Mapping[int, ObjectAnnotation]) -> str | None:
     return " ".join(filter(None, words))
 
 
-def draw(pen: ImageDraw, sample: Sample, scale: float) -> None:
+def _draw(pen: ImageDraw, sample: Sample, scale: float) -> None:
     """Each expression at its object."""
     by_id = {o.id: o for o in sample.objects}
     for one in sample.referring:
@@ -263,7 +263,7 @@ LABEL = SampleLabel(
             ids={"object": in_attributes("object", "landmark")},
         ),
     ),
-    compute=compute,
-    prove=prove,
-    drawing=Drawing("referring", lines=draw),
+    compute=_compute,
+    prove=_prove,
+    drawing=Drawing("referring", lines=_draw),
 )

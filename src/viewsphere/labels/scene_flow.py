@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from viewsphere.labels.shared.context import LabelContext
 
 
-def scene_flow(context: LabelContext, to: Next | Previous) -> NDArray[np.float32]:
+def _scene_flow(context: LabelContext, to: Next | Previous) -> NDArray[np.float32]:
     """Return X at another instant minus X now, (H, W, 3) metres, each in its own instant's camera axes, so it includes the
     camera's motion. NaN for the sky, and for things that are absent at that instant.
     """
@@ -57,7 +57,7 @@ def _label(name: str, to: Next | Previous, when: str, state: str) -> ChannelLabe
         components=3,
         unit="m",
         empty=np.nan,
-        compute=lambda context: scene_flow(context, to),
+        compute=lambda context: _scene_flow(context, to),
         prove=prove,
         drawing=drawing(name, NEAR),
     )

@@ -12,7 +12,7 @@ from viewsphere.model.annotations.classes import SKY, class_colors
 from viewsphere.model.sample import Sample
 
 
-def prove(sample: Sample, models: Models) -> Iterator[str]:
+def _prove(sample: Sample, models: Models) -> Iterator[str]:
     """Objects have their categories' classes, everything else is stuff, and empty pixels are sky."""
     classes, instances = channel_of(sample, "semantic"), channel_of(sample, "instances")
     if classes is not None and instances is not None:
@@ -29,7 +29,7 @@ LABEL = ChannelLabel(
     encoding="png16",
     colors=tuple(map(tuple, class_colors().tolist())),
     compute=lambda context: context.per_triangle(context.geometry.triangle_class, SKY),
-    prove=prove,
+    prove=_prove,
     ids={"category": with_classes},
     drawing=Drawing("semantic", beside=lambda sample: colored(sample.channels["semantic"]), key=KEY),
 )

@@ -26,7 +26,7 @@ TOLERANCE = 1e-9
 """Tolerance of the poses' entries as a share of their size: rounding errors of float64 are a million times smaller."""
 
 
-def compute(context: LabelContext, objects: Sequence[ObjectAnnotation]) -> Mapping[str, Any]:
+def _compute(context: LabelContext, objects: Sequence[ObjectAnnotation]) -> Mapping[str, Any]:
     """The poses of all sensors at the picture's instant, including its own."""
     now = context.get(RigPoses())
     if now is None:
@@ -35,7 +35,7 @@ def compute(context: LabelContext, objects: Sequence[ObjectAnnotation]) -> Mappi
     return {"camera_from_sensors": np.stack([compose(own, rigid(one.R.T, one.center)) for one in now.cameras])}
 
 
-def prove(sample: Sample, models: Models) -> Iterator[str]:
+def _prove(sample: Sample, models: Models) -> Iterator[str]:
     """Yield an error unless every pose is rigid, and the picture's own pose is the identity."""
     poses = sample.camera_from_sensors
     turns = poses[:, :3, :3]
@@ -45,7 +45,7 @@ def prove(sample: Sample, models: Models) -> Iterator[str]:
         yield "expected the identity, the picture's own sensor, among the poses; found none"
 
 
-def draw(pen: ImageDraw, sample: Sample, scale: float) -> None:
+def _draw(pen: ImageDraw, sample: Sample, scale: float) -> None:
     """A small map in the lower right corner, with the picture's own sensor in white, and the axes of the other visible
     sensors.
     """
@@ -76,11 +76,11 @@ LABEL = SampleLabel(
             is_array=True,
         ),
     ),
-    compute=compute,
-    prove=prove,
+    compute=_compute,
+    prove=_prove,
     drawing=Drawing(
         "sensor_poses",
-        lines=draw,
+        lines=_draw,
         key=(("sensor_poses: the sensors from above, its own white; axes of those it sees: x red, y green, z blue", None),),
     ),
 )

@@ -15,12 +15,12 @@ TOLERANCE = 1e-9
 """Tolerance of the proof as a share of the size."""
 
 
-def fields(placement: Placement) -> Mapping[str, Any]:
+def _fields(placement: Placement) -> Mapping[str, Any]:
     """The 3D box's extents, and the model's true size."""
     return {"size": Box3d(placement.box).size, "real_size": placement.facts.real_size}
 
 
-def prove(sample: Sample, models: Models) -> Iterator[str]:
+def _prove(sample: Sample, models: Models) -> Iterator[str]:
     """Sizes match the box and the model."""
     for o in rendered(sample):
         low, high = o.box3d_object.min(axis=0), o.box3d_object.max(axis=0)
@@ -32,7 +32,7 @@ def prove(sample: Sample, models: Models) -> Iterator[str]:
 
 
 LABEL = ObjectLabel.from_placement(
-    fields,
+    _fields,
     name="size",
     meaning="how large it is: width along X, height along Z, length along Y of its own axes",
     axes="object",
@@ -40,7 +40,7 @@ LABEL = ObjectLabel.from_placement(
         Field("size", "width, height and length of its 3D box", float, (3,), "m"),
         Field("real_size", "the true ones, None where nobody said", float, (3,), "m", optional=True),
     ),
-    prove=prove,
+    prove=_prove,
     drawing=Drawing(
         "size",
         lines=notes(lambda o: " x ".join(f"{side:.2f}" for side in o.size)),

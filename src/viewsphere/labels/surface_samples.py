@@ -65,7 +65,7 @@ UNIT = 1e-5
 """By how much the components of float32 normals may differ."""
 
 
-def compute(context: LabelContext) -> NDArray[np.void]:
+def _compute(context: LabelContext) -> NDArray[np.void]:
     """Rows of samples, `count` (an option) for each object, in the order of the ids, (N,) of `SURFACE_SAMPLE`; none of an
     object that is not there, or has no surface.
 
@@ -97,7 +97,7 @@ def _unit(vectors: Float) -> Float:
     return vectors / np.sqrt(x * x + y * y + z * z)[:, None]
 
 
-def prove(sample: Sample, models: Models) -> Iterator[str]:
+def _prove(sample: Sample, models: Models) -> Iterator[str]:
     """Points lie in their objects' boxes, are elsewhere by the pose alone, and in the picture where the camera shows them."""
     rows = channel_of(sample, "surface_samples")
     if rows is None:
@@ -170,7 +170,7 @@ LABEL = ChannelLabel(
     empty=np.nan,
     encoding="npz",
     ids={"object": in_column("object"), "part": in_column("triangle")},
-    compute=compute,
-    prove=prove,
+    compute=_compute,
+    prove=_prove,
     drawing=Drawing("surface_samples", lines=draw),
 )

@@ -31,7 +31,7 @@ WORST = 4
 """The last of the states."""
 
 
-def compute(context: LabelContext) -> NDArray[np.void]:
+def _compute(context: LabelContext) -> NDArray[np.void]:
     """One row per point, (N,) of `viewsphere.model.annotations.tracks.TRACK`. Raises ValueError if the shot follows no
     points.
     """
@@ -49,7 +49,7 @@ def compute(context: LabelContext) -> NDArray[np.void]:
     return out
 
 
-def prove(sample: Sample, models: Models) -> Iterator[str]:
+def _prove(sample: Sample, models: Models) -> Iterator[str]:
     """States are valid, points are on objects of the sample, and each point that is not invalid has a position."""
     rows = channel_of(sample, "tracks")
     if rows is None:
@@ -66,7 +66,7 @@ def prove(sample: Sample, models: Models) -> Iterator[str]:
         yield f"expected points on objects of the sample; found {absent.sum()} on others that are not invalid"
 
 
-def draw(pen: ImageDraw, samples: Sequence[Sample], scale: float) -> None:
+def _draw(pen: ImageDraw, samples: Sequence[Sample], scale: float) -> None:
     """Each point in the colour of the position where it was picked: filled if it is seen, hollow if something hides it. A line
     leads to it from its positions at the instants before. A sample's points are the rows of its own sensor.
     """
@@ -122,7 +122,7 @@ LABEL = ChannelLabel(
     empty=np.nan,
     encoding="npz",
     ids={"object": in_column("object")},
-    compute=compute,
-    prove=prove,
-    drawing=Drawing("tracks", trails=draw, key=(("tracks: filled is visible, hollow is occluded", None),)),
+    compute=_compute,
+    prove=_prove,
+    drawing=Drawing("tracks", trails=_draw, key=(("tracks: filled is visible, hollow is occluded", None),)),
 )

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from viewsphere.labels.shared.context import LabelContext
 
 
-def compute(context: LabelContext) -> NDArray[np.int32]:
+def _compute(context: LabelContext) -> NDArray[np.int32]:
     """Index (H, W) of the triangle within its object; -1 on scenery, on ground, and where nothing is seen."""
     g = context.geometry
     index = np.full(len(g.triangles), -1, np.int32)
@@ -27,7 +27,7 @@ def compute(context: LabelContext) -> NDArray[np.int32]:
     return context.per_triangle(index, -1)
 
 
-def prove(sample: Sample, models: Models) -> Iterator[str]:
+def _prove(sample: Sample, models: Models) -> Iterator[str]:
     """Objects have triangles; the background has none."""
     triangles, instances = channel_of(sample, "triangles"), channel_of(sample, "instances")
     if triangles is not None and instances is not None and ((triangles >= 0) != (instances > 0)).any():
@@ -42,7 +42,7 @@ LABEL = ChannelLabel(
     unit="triangle",
     empty=-1,
     ids={"part": by_table},
-    compute=compute,
-    prove=prove,
+    compute=_compute,
+    prove=_prove,
     drawing=Drawing("triangles", pixels=lambda picture, sample: by_number(picture, sample.channels["triangles"] + 1)),
 )

@@ -29,7 +29,7 @@ AROUND = (Poses(-1), Poses(0), Poses(1))
 FIELDS = ("velocity", "angular_velocity", "acceleration")
 
 
-def compute(context: LabelContext, i: int) -> Mapping[str, Any]:
+def _compute(context: LabelContext, i: int) -> Mapping[str, Any]:
     """Central differences between the poses at the adjacent instants, for the middle of the object's box. At a sequence's ends,
     and where the object appears or disappears, they are one-sided differences without an acceleration.
 
@@ -51,13 +51,13 @@ def compute(context: LabelContext, i: int) -> Mapping[str, Any]:
     return dict(zip(FIELDS, (moved / time, turned / time, acceleration), strict=True))
 
 
-def keep(o: ObjectAnnotation) -> Any:
+def _keep(o: ObjectAnnotation) -> Any:
     """Return the three fields; None if they are unknown."""
     kept = [None if getattr(o, name) is None else getattr(o, name).tolist() for name in FIELDS]
     return kept if any(kept) else None
 
 
-def restore(kept: Any, placement: Placement, o: ObjectAnnotation) -> Mapping[str, Any]:
+def _restore(kept: Any, placement: Placement, o: ObjectAnnotation) -> Mapping[str, Any]:
     """The fields, from lists of numbers."""
     return {
         name: None if value is None else np.array(value, np.float64)
@@ -65,14 +65,14 @@ def restore(kept: Any, placement: Placement, o: ObjectAnnotation) -> Mapping[str
     }
 
 
-def prove(sample: Sample, models: Models) -> Iterator[str]:
+def _prove(sample: Sample, models: Models) -> Iterator[str]:
     """An object that turns or speeds up has a velocity, and no number is infinite."""
     for o in rendered(sample):
         if (o.velocity is None) != (o.angular_velocity is None) or (o.velocity is None and o.acceleration is not None):
             yield f"object {o.id}: expected velocity and angular velocity together, found {o.velocity}, {o.angular_velocity}"
 
 
-def draw(pen: ImageDraw, sample: Sample, scale: float) -> None:
+def _draw(pen: ImageDraw, sample: Sample, scale: float) -> None:
     """A line from the middle of each object's box to its position half a second later."""
     for o in sample.objects:
         if o.velocity is not None:
@@ -104,9 +104,9 @@ LABEL = ObjectLabel(
         Field("angular_velocity", "along the axis about which it turns", float, (3,), "rad/s", "", True, True),
         Field("acceleration", "None at a sequence's ends, too", float, (3,), "m/s^2", "", True, True),
     ),
-    compute=compute,
-    keep=keep,
-    restore=restore,
-    prove=prove,
-    drawing=Drawing("velocity", lines=draw, key=(("velocity: half a second of motion", None),)),
+    compute=_compute,
+    keep=_keep,
+    restore=_restore,
+    prove=_prove,
+    drawing=Drawing("velocity", lines=_draw, key=(("velocity: half a second of motion", None),)),
 )

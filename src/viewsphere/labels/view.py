@@ -16,7 +16,7 @@ TOLERANCE = 1e-6
 """Tolerance of the camera's position, in metres at the object and as a share of the distance."""
 
 
-def prove(sample: Sample, models: Models) -> Iterator[str]:
+def _prove(sample: Sample, models: Models) -> Iterator[str]:
     """Azimuth, elevation and distance lead from the object to the camera."""
     for o in rendered(sample):
         center = o.camera_from_object[:3, :3].T @ -o.camera_from_object[:3, 3] - o.box3d_object.mean(axis=0)
@@ -32,7 +32,7 @@ LABEL = ObjectLabel.from_placement(
     meaning="the camera's orbit around the centre of its box",
     axes="object",
     fields=(Field("view", "azimuth, elevation and tilt (degrees) and distance (m)", ObjectView),),
-    prove=prove,
+    prove=_prove,
     drawing=Drawing(
         "view",
         lines=notes(lambda o: f"{o.view.azimuth_deg:.0f} {o.view.elevation_deg:.0f} {o.view.tilt_deg:.0f}"),

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from viewsphere.labels.shared.context import LabelContext
 
 
-def compute(context: LabelContext, i: int) -> Mapping[str, Any]:
+def _compute(context: LabelContext, i: int) -> Mapping[str, Any]:
     """Both shares of one object.
 
     Visibility is the object's visible pixels over all pixels that it would cover if it were alone, on a canvas of three times
@@ -57,7 +57,7 @@ def _pixels_alone(context: LabelContext, i: int) -> tuple[int, int]:
     return int(np.count_nonzero(alone.inverse_depth)), int(np.count_nonzero(inside.inverse_depth))
 
 
-def prove(sample: Sample, models: Models) -> Iterator[str]:
+def _prove(sample: Sample, models: Models) -> Iterator[str]:
     """Both shares are in [0, 1], and visibility is above 0 exactly for objects with visible pixels."""
     for o in rendered(sample):
         shares, seen = (o.visibility, o.truncation), int(o.mask.sum())
@@ -72,9 +72,9 @@ LABEL = ObjectLabel(
         Field("visibility", "visible pixels over all that it alone would cover, those outside included", float),
         Field("truncation", "share of the latter outside of the image", float),
     ),
-    compute=compute,
+    compute=_compute,
     keep=lambda o: [o.visibility, o.truncation],
     restore=lambda kept, placement, o: {"visibility": kept[0], "truncation": kept[1]},
-    prove=prove,
+    prove=_prove,
     drawing=Drawing("visibility", lines=notes(lambda o: f"{o.visibility:.0%}"), key=(("visibility: how much is seen", None),)),
 )

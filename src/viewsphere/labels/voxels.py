@@ -53,7 +53,7 @@ MESHES = 256
 """Number of meshes in the cache of `_known`."""
 
 
-def compute(context: LabelContext) -> NDArray[np.void]:
+def _compute(context: LabelContext) -> NDArray[np.void]:
     """The cells of the grid, its first axis slowest, as runs of equal ones, (N,) of `viewsphere.model.annotations.voxels.RUN`.
 
     A cell belongs to an object if part of a triangle is in it or, for closed pieces of objects, if its centre is inside. It
@@ -198,7 +198,7 @@ def _lifted(camera: Camera, grid: Grid, points: Float) -> Float:
     return grid.cells(transform(camera.R.T, points - camera.t))
 
 
-def prove(sample: Sample, models: Models) -> Iterator[str]:
+def _prove(sample: Sample, models: Models) -> Iterator[str]:
     """Runs fill the grid, classes match their objects, objects are inside their boxes, and depth agrees with surface cells."""
     runs = channel_of(sample, "voxels")
     if runs is None or sample.known_camera is None:
@@ -282,8 +282,8 @@ LABEL = ChannelLabel(
     unit="cells",
     empty=0,
     encoding="npz",
-    compute=compute,
-    prove=prove,
+    compute=_compute,
+    prove=_prove,
     ids={"category": in_column("class", with_classes), "object": in_column("instance")},
     drawing=Drawing("voxels", beside=drawn, key=(("voxels from behind the camera; pale: not in its view", None), *KEY)),
 )

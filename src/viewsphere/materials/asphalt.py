@@ -13,7 +13,7 @@ from viewsphere.plugins.material import MaterialSpec
 
 
 @dataclass(frozen=True)
-class Asphalt:
+class _Asphalt:
     """Linear colours of bitumen and of dark and light stones, size of the largest stones in metres; amounts of visible stone
     and of cracks.
     """
@@ -27,9 +27,9 @@ class Asphalt:
     seed: int = 0
 
 
-def asphalt(parameters: Asphalt | None = None, size: int = 512) -> Surface:
+def _asphalt(parameters: _Asphalt | None = None, size: int = 512) -> Surface:
     """The road: angular stones of two sizes, each with a flat worn face, in finer grit."""
-    p = parameters or Asphalt()
+    p = parameters or _Asphalt()
     patches = noise(size, max(round(2 * p.metres), 2), p.seed, 6, 0.55)
     grit = noise(size, max(round(p.metres / 0.004), 2), p.seed + 1, 2, 0.8)
     coarse = cells(size, max(round(p.metres / p.stone), 2), p.seed + 2)
@@ -48,7 +48,7 @@ def asphalt(parameters: Asphalt | None = None, size: int = 512) -> Surface:
     return Surface(shaded(color, (1 - 0.6 * crack) * (1 + 0.1 * patches)), np.clip(rough, 0.4, 1), height, p.metres)
 
 
-def _cracks(size: int, p: Asphalt, patches: Map) -> Map:
+def _cracks(size: int, p: _Asphalt, patches: Map) -> Map:
     """Thin lines, here and there."""
     line = np.abs(noise(size, 2, p.seed + 4, 7, 0.44) + 0.02)
     return smooth(0.012, 0.004, line) * smooth(
@@ -56,12 +56,12 @@ def _cracks(size: int, p: Asphalt, patches: Map) -> Map:
     )
 
 
-def draw(rng: np.random.Generator) -> Asphalt:
+def _draw(rng: np.random.Generator) -> _Asphalt:
     """New and black to old and grey."""
     worn = float(rng.uniform(0.1, 0.95))
     light = 0.75 + 1.0 * worn * float(rng.uniform(0.6, 1.2))
     bitumen, dark, pale = 0.04 * light, 0.066 * light, 0.2 * light
-    return Asphalt(
+    return _Asphalt(
         bitumen=(bitumen, bitumen, 1.05 * bitumen),
         stones=((dark, dark, dark), (pale, 0.97 * pale, 0.92 * pale)),
         stone=float(rng.uniform(0.008, 0.014)),
@@ -72,4 +72,4 @@ def draw(rng: np.random.Generator) -> Asphalt:
     )
 
 
-MATERIAL = MaterialSpec(word="asphalt", surface=asphalt, draw=draw)
+MATERIAL = MaterialSpec(word="asphalt", surface=_asphalt, draw=_draw)

@@ -35,7 +35,7 @@ class Brick:
         return self.columns * self.length
 
 
-def brick(parameters: Brick | None = None, size: int = 512) -> Surface:
+def _brick(parameters: Brick | None = None, size: int = 512) -> Surface:
     """The wall: every brick has a tone of its own, is worn at its edges, and stands out of the mortar by some millimetres."""
     p = parameters or Brick()
     rng = np.random.default_rng(p.seed)
@@ -68,7 +68,7 @@ FIRED: tuple[tuple[Color, Color, Color], ...] = (
 )
 
 
-def draw(rng: np.random.Generator) -> Brick:
+def _draw(rng: np.random.Generator) -> Brick:
     """Red more often than yellow, brown, grey or whitewashed."""
     mortar = float(rng.uniform(0.2, 0.6))
     rows = int(rng.choice((12, 16, 20)))
@@ -85,4 +85,4 @@ def draw(rng: np.random.Generator) -> Brick:
     )
 
 
-MATERIAL = MaterialSpec(word="brick", surface=brick, draw=draw)
+MATERIAL = MaterialSpec(word="brick", surface=_brick, draw=_draw)

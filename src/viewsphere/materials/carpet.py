@@ -30,7 +30,7 @@ class Carpet:
     seed: int = 0
 
 
-def carpet(parameters: Carpet | None = None, size: int = 512) -> Surface:
+def _carpet(parameters: Carpet | None = None, size: int = 512) -> Surface:
     """The pile: every tuft is lit on top and dark between, leans its own way, and footsteps brush whole patches aside."""
     p = parameters or Carpet()
     tufts = cells(size, p.tufts, p.seed, 1 - p.ordered)
@@ -55,7 +55,7 @@ YARNS: tuple[Color, ...] = (
 )  # fmt: skip
 
 
-def draw(rng: np.random.Generator) -> Carpet:
+def _draw(rng: np.random.Generator) -> Carpet:
     """Loops or pile, plain, flecked or with diamonds."""
     color, fleck = (YARNS[int(i)] for i in rng.choice(len(YARNS), size=2, replace=False))
     metres = float(rng.uniform(0.5, 0.9))
@@ -72,4 +72,4 @@ def draw(rng: np.random.Generator) -> Carpet:
     )
 
 
-MATERIAL = MaterialSpec(word="carpeted", surface=carpet, draw=draw)
+MATERIAL = MaterialSpec(word="carpeted", surface=_carpet, draw=_draw)

@@ -13,7 +13,7 @@ from viewsphere.plugins.material import MaterialSpec
 
 
 @dataclass(frozen=True)
-class Concrete:
+class _Concrete:
     """Linear colour; strength of clouds, stains and pores, 0 to 1; panels per side, with seams between them, 0 for none."""
 
     color: Color = (0.41, 0.40, 0.38)
@@ -25,9 +25,9 @@ class Concrete:
     seed: int = 0
 
 
-def concrete(parameters: Concrete | None = None, size: int = 512) -> Surface:
+def _concrete(parameters: _Concrete | None = None, size: int = 512) -> Surface:
     """The slab."""
-    p = parameters or Concrete()
+    p = parameters or _Concrete()
     clouds = noise(size, max(round(2 * p.metres), 2), p.seed, 7, 0.6)
     blots = noise(size, max(round(4 * p.metres), 2), p.seed + 1, 5, 0.55)
     grit = noise(size, max(round(110 * p.metres), 2), p.seed + 2, 2, 0.8)
@@ -43,7 +43,7 @@ def concrete(parameters: Concrete | None = None, size: int = 512) -> Surface:
     return Surface(shaded(p.color, shade * (1 - 0.55 * pore) * (1 - 0.45 * seam)), np.clip(rough, 0.4, 1), height, p.metres)
 
 
-def _seams(size: int, p: Concrete) -> Map:
+def _seams(size: int, p: _Concrete) -> Map:
     """1 in the seams between panels."""
     if not p.panels:
         return np.zeros((size, size), np.float32)
@@ -53,10 +53,10 @@ def _seams(size: int, p: Concrete) -> Map:
     return smooth(width, 0.3 * width, np.minimum(off[:, None], off[None]).astype(np.float32))
 
 
-def draw(rng: np.random.Generator) -> Concrete:
+def _draw(rng: np.random.Generator) -> _Concrete:
     """Light to dark, smooth to porous, in panels or without."""
     light, warm = float(rng.uniform(0.22, 0.55)), float(rng.uniform(0.9, 1.0))
-    return Concrete(
+    return _Concrete(
         color=(light, light * (0.5 + 0.5 * warm), light * warm),
         clouds=float(rng.uniform(0.2, 0.9)),
         stains=float(rng.uniform(0.0, 0.8)),
@@ -67,4 +67,4 @@ def draw(rng: np.random.Generator) -> Concrete:
     )
 
 
-MATERIAL = MaterialSpec(word="concrete", surface=concrete, draw=draw)
+MATERIAL = MaterialSpec(word="concrete", surface=_concrete, draw=_draw)

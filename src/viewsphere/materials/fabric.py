@@ -31,7 +31,7 @@ class Fabric:
     seed: int = 0
 
 
-def fabric(parameters: Fabric | None = None, size: int = 512) -> Surface:
+def _fabric(parameters: Fabric | None = None, size: int = 512) -> Surface:
     """The cloth: every thread has its own tone and thickness, and goes over and under those across it."""
     p = parameters or Fabric()
     rng = np.random.default_rng(p.seed)
@@ -75,7 +75,7 @@ DYES: tuple[Color, ...] = (
 )  # fmt: skip
 
 
-def draw(rng: np.random.Generator) -> Fabric:
+def _draw(rng: np.random.Generator) -> Fabric:
     """Of two dyes; plain more often than striped or checked."""
     color, other = (DYES[int(i)] for i in rng.choice(len(DYES), size=2, replace=False))
     pattern: tuple[Literal["plain", "stripes", "checks"], ...] = ("plain", "stripes", "checks")
@@ -93,4 +93,4 @@ def draw(rng: np.random.Generator) -> Fabric:
     )
 
 
-MATERIAL = MaterialSpec(word="fabric", surface=fabric, draw=draw)
+MATERIAL = MaterialSpec(word="fabric", surface=_fabric, draw=_draw)

@@ -14,7 +14,7 @@ from viewsphere.plugins.material import MaterialSpec
 
 
 @dataclass(frozen=True)
-class Grass:
+class _Grass:
     """Linear colours of fresh and dry blades and of the soil, metres of the longest blade, blades a square metre; dryness: 0 to
     1.
     """
@@ -29,9 +29,9 @@ class Grass:
     seed: int = 0
 
 
-def grass(parameters: Grass | None = None, size: int = 512) -> Surface:
+def _grass(parameters: _Grass | None = None, size: int = 512) -> Surface:
     """The lawn: later blades lie higher and are lighter, tufts differ in tone, some blades are dry."""
-    p = parameters or Grass()
+    p = parameters or _Grass()
     rng = np.random.default_rng(p.seed)
     count = int(p.blades * p.metres**2)
     long = p.blade / p.metres
@@ -53,10 +53,10 @@ def grass(parameters: Grass | None = None, size: int = 512) -> Surface:
     return Surface(color, np.clip(0.75 + 0.2 * (1 - lawn.height), 0, 1), height, p.metres)
 
 
-def draw(rng: np.random.Generator) -> Grass:
+def _draw(rng: np.random.Generator) -> _Grass:
     """Fresh to dry, short to long."""
     light, yellow = float(rng.uniform(0.75, 1.3)), float(rng.uniform(0.85, 1.35))
-    return Grass(
+    return _Grass(
         fresh=(0.062 * light * yellow, 0.135 * light, 0.02 * light),
         blade=float(rng.uniform(0.03, 0.07)),
         blades=int(rng.uniform(30_000, 50_000)),
@@ -66,4 +66,4 @@ def draw(rng: np.random.Generator) -> Grass:
     )
 
 
-MATERIAL = MaterialSpec(word="grass", surface=grass, draw=draw)
+MATERIAL = MaterialSpec(word="grass", surface=_grass, draw=_draw)

@@ -25,7 +25,7 @@ class Leather:
     seed: int = 0
 
 
-def leather(parameters: Leather | None = None, size: int = 512) -> Surface:
+def _leather(parameters: Leather | None = None, size: int = 512) -> Surface:
     """The hide: creases are the borders of cells of three sizes, fewer of the large ones."""
     p = parameters or Leather()
     count = max(round(p.metres / p.pebble), 4)
@@ -53,7 +53,7 @@ HIDES: tuple[Color, ...] = (
 )  # fmt: skip
 
 
-def draw(rng: np.random.Generator) -> Leather:
+def _draw(rng: np.random.Generator) -> Leather:
     """Brown, black, tan, red, cream, ..., smooth to pebbled."""
     metres = float(rng.uniform(0.15, 0.3))
     return Leather(
@@ -67,4 +67,4 @@ def draw(rng: np.random.Generator) -> Leather:
     )
 
 
-MATERIAL = MaterialSpec(word="leather", surface=leather, draw=draw)
+MATERIAL = MaterialSpec(word="leather", surface=_leather, draw=_draw)

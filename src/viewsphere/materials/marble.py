@@ -25,7 +25,7 @@ class Marble:
     seed: int = 0
 
 
-def marble(parameters: Marble | None = None, size: int = 512) -> Surface:
+def _marble(parameters: Marble | None = None, size: int = 512) -> Surface:
     """The stone: veins are where warped noise changes its sign, broad and faint ones below thin and dark ones."""
     p = parameters or Marble()
     clouds, patches = noise(size, 3, p.seed, 7, 0.55), noise(size, 3, p.seed + 1, 4)
@@ -58,7 +58,7 @@ STONES: tuple[tuple[Color, Color, Color], ...] = (
 )
 
 
-def draw(rng: np.random.Generator) -> Marble:
+def _draw(rng: np.random.Generator) -> Marble:
     """White, cream, black, green, red or grey."""
     color, cloud, vein = STONES[int(rng.choice(len(STONES), p=(0.35, 0.2, 0.15, 0.1, 0.1, 0.1)))]
     light = float(rng.uniform(0.85, 1.08))
@@ -73,4 +73,4 @@ def draw(rng: np.random.Generator) -> Marble:
     )
 
 
-MATERIAL = MaterialSpec(word="marble", surface=marble, draw=draw)
+MATERIAL = MaterialSpec(word="marble", surface=_marble, draw=_draw)

@@ -24,7 +24,7 @@ class Metal:
     seed: int = 0
 
 
-def metal(parameters: Metal | None = None, size: int = 512) -> Surface:
+def _metal(parameters: Metal | None = None, size: int = 512) -> Surface:
     """The sheet, brushed along u."""
     p = parameters or Metal()
     lines = noise(size, (2, 125), p.seed, 2, 0.8) + 0.5 * noise(size, (7, 170), p.seed + 1)
@@ -45,7 +45,7 @@ METALS: tuple[Color, ...] = (
 )  # fmt: skip
 
 
-def draw(rng: np.random.Generator) -> Metal:
+def _draw(rng: np.random.Generator) -> Metal:
     """Steel, aluminium, silver, copper, gold, chrome, brass, iron (reflectances: Hoffman, SIGGRAPH 2010), polished to dull."""
     r, g, b = METALS[int(rng.integers(len(METALS)))]
     light = float(rng.uniform(0.7, 1.0))
@@ -60,4 +60,4 @@ def draw(rng: np.random.Generator) -> Metal:
     )
 
 
-MATERIAL = MaterialSpec(word="metal", surface=metal, draw=draw, grained=True)
+MATERIAL = MaterialSpec(word="metal", surface=_metal, draw=_draw, grained=True)

@@ -14,7 +14,7 @@ from viewsphere.plugins.material import MaterialSpec
 
 
 @dataclass(frozen=True)
-class Paper:
+class _Paper:
     """Linear colour; strength of fibres and creases, 0 to 1; flutes: waves of cardboard over `metres`, 0 for none."""
 
     color: Color = (0.70, 0.68, 0.62)
@@ -25,9 +25,9 @@ class Paper:
     seed: int = 0
 
 
-def paper(parameters: Paper | None = None, size: int = 512) -> Surface:
+def _paper(parameters: _Paper | None = None, size: int = 512) -> Surface:
     """The sheet: crumpled, its facets meet in sharp creases; fibres of its pulp are seen."""
-    p = parameters or Paper()
+    p = parameters or _Paper()
     rng = np.random.default_rng(p.seed)
     pulp, clouds = noise(size, 60, p.seed, 4, 0.7), noise(size, 4, p.seed + 1, 5, 0.55)
     fibre = strokes(size, 2500, (0.01, 0.035), (0.0008, 0.0016), 0.6, rng)
@@ -66,12 +66,12 @@ SHEETS: tuple[tuple[Color, float, float, int], ...] = (
 )
 
 
-def draw(rng: np.random.Generator) -> Paper:
+def _draw(rng: np.random.Generator) -> _Paper:
     """Writing paper, kraft paper, corrugated cardboard, old, recycled and coloured paper."""
     color, fibres, creases, flutes = SHEETS[int(rng.integers(len(SHEETS)))]
     r, g, b = color
     light = float(rng.uniform(0.85, 1.05))
-    return Paper(
+    return _Paper(
         color=(r * light, g * light, b * light),
         fibres=fibres * float(rng.uniform(0.6, 1.1)),
         creases=creases * float(rng.uniform(0.0, 1.3)),
@@ -81,4 +81,4 @@ def draw(rng: np.random.Generator) -> Paper:
     )
 
 
-MATERIAL = MaterialSpec(word="paper", surface=paper, draw=draw)
+MATERIAL = MaterialSpec(word="paper", surface=_paper, draw=_draw)

@@ -15,7 +15,7 @@ from viewsphere.plugins.material import MaterialSpec
 
 
 @dataclass(frozen=True)
-class Planks:
+class _Planks:
     """`rows` of planks over `metres`, `columns` in each, and the `joint` between them, metres; contrast: the difference between
     planks; finish: the roughness of the varnish.
     """
@@ -30,9 +30,9 @@ class Planks:
     seed: int = 0
 
 
-def planks(parameters: Planks | None = None, size: int = 512) -> Surface:
+def _planks(parameters: _Planks | None = None, size: int = 512) -> Surface:
     """The floor: each plank is cut from another place, has rounded edges, and lies a little higher or lower."""
-    p = parameters or Planks()
+    p = parameters or _Planks()
     rng = np.random.default_rng(p.seed)
     floor = courses(size, p.metres, even(p.rows), uneven(rng, p.rows, p.columns, 0.5))
     own = grain(size, p.metres, floor, p.timber, p.seed)
@@ -50,10 +50,10 @@ def planks(parameters: Planks | None = None, size: int = 512) -> Surface:
     return Surface(color, np.clip(rough, 0.05, 1), height, p.metres)
 
 
-def draw(rng: np.random.Generator) -> Planks:
+def _draw(rng: np.random.Generator) -> _Planks:
     """Strips of a few centimetres to broad boards."""
     metres = float(rng.uniform(1.6, 2.2))
-    return Planks(
+    return _Planks(
         timber=draw_timber(rng),
         rows=round(metres / float(rng.uniform(0.07, 0.2))),
         columns=int(rng.integers(1, 4)),
@@ -65,4 +65,4 @@ def draw(rng: np.random.Generator) -> Planks:
     )
 
 
-MATERIAL = MaterialSpec(word="wooden", surface=planks, draw=draw, grained=True)
+MATERIAL = MaterialSpec(word="wooden", surface=_planks, draw=_draw, grained=True)

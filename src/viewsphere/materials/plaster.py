@@ -13,7 +13,7 @@ from viewsphere.plugins.material import MaterialSpec
 
 
 @dataclass(frozen=True)
-class Plaster:
+class _Plaster:
     """Linear colour of the paint; strength of grains, strokes of the trowel, and stains, 0 to 1."""
 
     color: Color = (0.70, 0.67, 0.60)
@@ -24,9 +24,9 @@ class Plaster:
     seed: int = 0
 
 
-def plaster(parameters: Plaster | None = None, size: int = 512) -> Surface:
+def _plaster(parameters: _Plaster | None = None, size: int = 512) -> Surface:
     """The wall: overlapping strokes leave ridges where one ends on another, grains stand out of it."""
-    p = parameters or Plaster()
+    p = parameters or _Plaster()
     clouds = noise(size, max(round(3 * p.metres), 2), p.seed, 6, 0.55)
     warp = noise(size, max(round(7 * p.metres), 2), p.seed + 1, 4, 0.5)
     lines = noise(size, (max(round(6 * p.metres), 2), max(round(16 * p.metres), 2)), p.seed + 2, 4, 0.55) + 0.5 * warp
@@ -48,11 +48,11 @@ PAINTS: tuple[Color, ...] = (
 )  # fmt: skip
 
 
-def draw(rng: np.random.Generator) -> Plaster:
+def _draw(rng: np.random.Generator) -> _Plaster:
     """White, cream, ochre, grey, pastel."""
     r, g, b = PAINTS[int(rng.integers(len(PAINTS)))]
     light = float(rng.uniform(0.8, 1.05))
-    return Plaster(
+    return _Plaster(
         color=(r * light, g * light, b * light),
         grains=float(rng.uniform(0.1, 1.0)),
         strokes=float(rng.uniform(0.0, 1.0)),
@@ -62,4 +62,4 @@ def draw(rng: np.random.Generator) -> Plaster:
     )
 
 
-MATERIAL = MaterialSpec(word="plaster", surface=plaster, draw=draw)
+MATERIAL = MaterialSpec(word="plaster", surface=_plaster, draw=_draw)

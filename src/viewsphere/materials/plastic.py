@@ -13,7 +13,7 @@ from viewsphere.plugins.material import MaterialSpec
 
 
 @dataclass(frozen=True)
-class Plastic:
+class _Plastic:
     """Linear colour and roughness; strength of the mould's grain and of scuffs, 0 to 1."""
 
     color: Color = (0.05, 0.18, 0.42)
@@ -24,9 +24,9 @@ class Plastic:
     seed: int = 0
 
 
-def plastic(parameters: Plastic | None = None, size: int = 512) -> Surface:
+def _plastic(parameters: _Plastic | None = None, size: int = 512) -> Surface:
     """The skin: one colour, little pits or bumps, long faint scratches."""
-    p = parameters or Plastic()
+    p = parameters or _Plastic()
     peel, patches = noise(size, 40, p.seed, 3), noise(size, 4, p.seed + 1, 5, 0.55)
     pits = cells(size, 150, p.seed + 2)
     pit = smooth(0.5, 0.15, pits.nearest) * pits.chance
@@ -39,12 +39,12 @@ def plastic(parameters: Plastic | None = None, size: int = 512) -> Surface:
     return Surface(shaded(p.color, shade), np.clip(rough, 0.05, 1), height.astype(np.float32), p.metres)
 
 
-def draw(rng: np.random.Generator) -> Plastic:
+def _draw(rng: np.random.Generator) -> _Plastic:
     """Any colour, more often a strong one; glossy to matt."""
     low, high = sorted(float(x) for x in rng.uniform(0.02, 0.75, 2))
     rest = float(rng.uniform(low, high))
     r, g, b = (float(x) for x in rng.permutation((low, rest, high)))
-    return Plastic(
+    return _Plastic(
         color=(r, g, b),
         finish=float(rng.uniform(0.1, 0.7)),
         grain=float(rng.choice((0.0, rng.uniform(0.2, 1.0)))),
@@ -54,4 +54,4 @@ def draw(rng: np.random.Generator) -> Plastic:
     )
 
 
-MATERIAL = MaterialSpec(word="plastic", surface=plastic, draw=draw)
+MATERIAL = MaterialSpec(word="plastic", surface=_plastic, draw=_draw)

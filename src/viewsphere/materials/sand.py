@@ -24,7 +24,7 @@ class Sand:
     seed: int = 0
 
 
-def sand(parameters: Sand | None = None, size: int = 512) -> Surface:
+def _sand(parameters: Sand | None = None, size: int = 512) -> Surface:
     """The ground: ripples are gentle to windward and steep to lee, and end and fork as they run."""
     p = parameters or Sand()
     bend = noise(size, 3, p.seed, 4, 0.42)
@@ -47,7 +47,7 @@ def sand(parameters: Sand | None = None, size: int = 512) -> Surface:
 SANDS: tuple[Color, ...] = (Sand.color, (0.60, 0.53, 0.40), (0.42, 0.24, 0.11), (0.26, 0.22, 0.17), (0.50, 0.47, 0.42))
 
 
-def draw(rng: np.random.Generator) -> Sand:
+def _draw(rng: np.random.Generator) -> Sand:
     """Of beaches, deserts and building sites; rippled or trodden flat."""
     metres = float(rng.uniform(1.2, 2.0))
     return Sand(
@@ -60,4 +60,4 @@ def draw(rng: np.random.Generator) -> Sand:
     )
 
 
-MATERIAL = MaterialSpec(word="sandy", surface=sand, draw=draw)
+MATERIAL = MaterialSpec(word="sandy", surface=_sand, draw=_draw)

@@ -29,7 +29,7 @@ class Stone:
     seed: int = 0
 
 
-def stone(parameters: Stone | None = None, size: int = 512) -> Surface:
+def _stone(parameters: Stone | None = None, size: int = 512) -> Surface:
     """The wall: courses of uneven height, ragged edges, faces broken into facets, speckles of the stone's minerals."""
     p = parameters or Stone()
     rng = np.random.default_rng(p.seed)
@@ -67,7 +67,7 @@ QUARRIES: tuple[tuple[Color, Color, Color], ...] = (
 )
 
 
-def draw(rng: np.random.Generator) -> Stone:
+def _draw(rng: np.random.Generator) -> Stone:
     """Limestone, sandstone, slate, granite."""
     colors = QUARRIES[int(rng.integers(len(QUARRIES)))]
     return Stone(
@@ -82,4 +82,4 @@ def draw(rng: np.random.Generator) -> Stone:
     )
 
 
-MATERIAL = MaterialSpec(word="stone", surface=stone, draw=draw)
+MATERIAL = MaterialSpec(word="stone", surface=_stone, draw=_draw)

@@ -14,7 +14,7 @@ from viewsphere.plugins.material import MaterialSpec
 
 
 @dataclass(frozen=True)
-class Tile:
+class _Tile:
     """`columns` by `rows` tiles over `metres`, linear colours of two kinds of them and of the joints, metres of a joint.
 
     board: the second kind at every other place, as on a chessboard; gloss: how smooth the glaze is.
@@ -35,9 +35,9 @@ class Tile:
     seed: int = 0
 
 
-def tile(parameters: Tile | None = None, size: int = 512) -> Surface:
+def _tile(parameters: _Tile | None = None, size: int = 512) -> Surface:
     """The tiles, each a little tilted, with rounded edges; dirt lies in the joints."""
-    p = parameters or Tile()
+    p = parameters or _Tile()
     rng = np.random.default_rng(p.seed)
     floor = courses(size, p.metres, even(p.rows), bonded(p.rows, p.columns, p.shift))
     draws = 2 * rng.random((4, floor.count)) - 1
@@ -65,12 +65,12 @@ PLAIN: tuple[Color, ...] = (
 SHAPES = ((4, 4, 1.2, 0.0), (8, 8, 1.2, 0.0), (6, 6, 0.6, 0.0), (2, 2, 1.2, 0.0), (6, 12, 0.9, 0.5), (10, 10, 0.25, 0.0))
 
 
-def draw(rng: np.random.Generator) -> Tile:
+def _draw(rng: np.random.Generator) -> _Tile:
     """Floor tiles, wall tiles, mosaic; of one colour, or two as on a chessboard."""
     columns, rows, metres, shift = SHAPES[int(rng.integers(len(SHAPES)))]
     color, other = (PLAIN[int(i)] for i in rng.integers(len(PLAIN), size=2))
     grout = float(rng.choice((0.06, 0.3, 0.5)))
-    return Tile(
+    return _Tile(
         color=color,
         other=other,
         grout=(grout, 0.97 * grout, 0.92 * grout),
@@ -87,4 +87,4 @@ def draw(rng: np.random.Generator) -> Tile:
     )
 
 
-MATERIAL = MaterialSpec(word="tiled", surface=tile, draw=draw)
+MATERIAL = MaterialSpec(word="tiled", surface=_tile, draw=_draw)

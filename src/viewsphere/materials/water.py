@@ -27,7 +27,7 @@ class Water:
     seed: int = 0
 
 
-def water(parameters: Water | None = None, size: int = 512) -> Surface:
+def _water(parameters: Water | None = None, size: int = 512) -> Surface:
     """The surface: sums of waves that run within a quarter turn of the wind, sharpened to crests, bent by noise."""
     p = parameters or Water()
     sea = _sea(size, p)
@@ -59,7 +59,7 @@ def _sea(size: int, p: Water) -> Map:
 SEAS: tuple[Color, ...] = (Water.deep, (0.02, 0.065, 0.05), (0.02, 0.04, 0.08), (0.06, 0.055, 0.035))
 
 
-def draw(rng: np.random.Generator) -> Water:
+def _draw(rng: np.random.Generator) -> Water:
     """Ponds to a choppy sea, blue, green or brown."""
     deep = SEAS[int(rng.choice(len(SEAS), p=(0.4, 0.3, 0.2, 0.1)))]
     metres = float(rng.uniform(2.0, 6.0))
@@ -75,4 +75,4 @@ def draw(rng: np.random.Generator) -> Water:
     )
 
 
-MATERIAL = MaterialSpec(word="watery", surface=water, draw=draw)
+MATERIAL = MaterialSpec(word="watery", surface=_water, draw=_draw)

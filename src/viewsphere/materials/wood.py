@@ -14,7 +14,7 @@ from viewsphere.plugins.material import MaterialSpec
 
 
 @dataclass(frozen=True)
-class Wood:
+class _Wood:
     """`boards` over `metres`, a kind of timber, and the roughness of its finish; contrast: the difference between boards."""
 
     timber: Timber = OAK
@@ -25,9 +25,9 @@ class Wood:
     seed: int = 0
 
 
-def wood(parameters: Wood | None = None, size: int = 512) -> Surface:
+def _wood(parameters: _Wood | None = None, size: int = 512) -> Surface:
     """The panel; boards have no ends, so that it repeats along the grain."""
-    p = parameters or Wood()
+    p = parameters or _Wood()
     rng = np.random.default_rng(p.seed)
     boards = courses(size, p.metres, even(p.boards), np.zeros((p.boards, 1)))
     own = grain(size, p.metres, boards, p.timber, p.seed)
@@ -38,9 +38,9 @@ def wood(parameters: Wood | None = None, size: int = 512) -> Surface:
     return Surface(shaded(color, dark), np.clip(rough, 0.05, 1), -0.00012 * own.late - 0.0003 * own.pores, p.metres)
 
 
-def draw(rng: np.random.Generator) -> Wood:
+def _draw(rng: np.random.Generator) -> _Wood:
     """Oak, pine, maple, walnut, ..., oiled to lacquered."""
-    return Wood(
+    return _Wood(
         timber=draw_timber(rng),
         boards=int(rng.integers(3, 9)),
         contrast=float(rng.uniform(0.03, 0.25)),
@@ -50,4 +50,4 @@ def draw(rng: np.random.Generator) -> Wood:
     )
 
 
-MATERIAL = MaterialSpec(word="wooden", surface=wood, draw=draw, grained=True)
+MATERIAL = MaterialSpec(word="wooden", surface=_wood, draw=_draw, grained=True)

@@ -36,7 +36,7 @@ def with_clips(
 
         def line_of(one: tuple[ModelSpec, int]) -> Timeline | None:
             spec, number = one
-            played = [field for field, motions in playing(recipe, number) if has_clip(motions)]
+            played = [field for field, motions in _playing(recipe, number) if has_clip(motions)]
             return _timeline(spec, recipe.models[number], played[0], blenders) if played else None
 
         lines = tuple(each(line_of, models))
@@ -44,7 +44,7 @@ def with_clips(
     return tuple(spec if line is None else resting(spec, recipe.models[number], line) for (spec, number), line in pairs), lines
 
 
-def playing(recipe: Recipe, number: int) -> tuple[tuple[str, Motions | None], ...]:
+def _playing(recipe: Recipe, number: int) -> tuple[tuple[str, Motions | None], ...]:
     """The possible motions of an entry's models, with their fields: the entry's own, and those of distractors."""
     company = recipe.scene.company
     motions = (f"models[{number}].motion", recipe.models[number].motion)
@@ -55,7 +55,7 @@ def shown_steps(recipe: Recipe, number: int, spec: ModelSpec, line: Timeline) ->
     """The time steps of a model that any sequence may show, ascending: all frames of its animation if the choice is random."""
     assert recipe.time is not None
     steps: dict[int, TimeStep] = {}
-    for field, motions in playing(recipe, number):
+    for field, motions in _playing(recipe, number):
         clips = tuple(entry for _, entry in listed(motions, field) if entry.kind == "clip")
         if any(map(_is_drawn, clips)):
             return tuple(TimeStep(frame=frame, seconds=line.seconds(frame)) for frame in range(line.first, line.last + 1))

@@ -50,7 +50,7 @@ def check_drawn(samples: Sequence[Sample], draw: Sequence[str]) -> None:
             raise StoreError(f"--draw: expected the {what} {source}, to draw {name}; found pictures that have {kept}")
 
 
-def drawn(sample: Sample, draw: Sequence[str]) -> list[Drawing]:
+def _drawn(sample: Sample, draw: Sequence[str]) -> list[Drawing]:
     """The chosen drawings that a sample has the labels for."""
     return [drawing for source, drawing in drawable().items() if drawing.name in draw and is_in(source, sample)]
 
@@ -59,7 +59,7 @@ def extents(samples: Sequence[Sample], draw: Sequence[str]) -> Extents:
     """Return the common value ranges of the drawings of some samples."""
     extents: dict[str, list[Extent]] = {}
     for sample in samples:
-        for drawing in drawn(sample, draw):
+        for drawing in _drawn(sample, draw):
             if drawing.extent:
                 extents.setdefault(drawing.name, []).append(drawing.extent(sample))
     return {name: (min(low for low, _ in pairs), max(high for _, high in pairs)) for name, pairs in extents.items()}
@@ -100,7 +100,7 @@ def _padded(picture: Picture, height: int, left: int) -> Picture:
 
 def _pictures(sample: Sample, draw: Sequence[str], width: int | None, before: Before, within: Extents) -> list[Picture]:
     """The picture, and the drawings beside it, all of one size."""
-    chosen = drawn(sample, draw)
+    chosen = _drawn(sample, draw)
     if picture_of(sample.channels) is None:
         if (stand_in := stand_in_for(sample.channels)) is not None:
             return [stand_in(sample, width or SIZE)]

@@ -370,21 +370,21 @@ def alternatives(value: Any) -> Iterator[Any]:
         yield value
 
 
-def ranged(value: Any) -> Any:
+def _ranged(value: Any) -> Any:
     """[low, high] as the uniform distribution that it abbreviates."""
     return {"uniform": value} if isinstance(value, (list, tuple)) else value
 
 
 CountDrawn = Annotated[
     Drawn[Count],
-    BeforeValidator(ranged),
+    BeforeValidator(_ranged),
     OrShort({"type": "array", "items": {"type": "integer", "minimum": 1}, "minItems": 2, "maxItems": 2}),
 ]
 """A whole number above 0; [low, high] means a uniform distribution."""
 
 CountOrNone = Annotated[
     Drawn[Natural],
-    BeforeValidator(ranged),
+    BeforeValidator(_ranged),
     OrShort({"type": "array", "items": {"type": "integer", "minimum": 0}, "minItems": 2, "maxItems": 2}),
 ]
 

@@ -59,7 +59,7 @@ def develop(radiance: Float32, background: Float32 | None, view: ViewTransform, 
     out, curve = np.empty((*radiance.shape[:2], 4 if alpha else 3), np.uint8), srgb_bytes()
     if view.transform == "standard" and not alpha:
         p = np.zeros(4 * kernels.BLOCK, np.float32)
-        kernels.standard_bytes(radiance.reshape(-1), exposure_matrix(view), _rows(background), curve, p, _rows(out))
+        kernels.standard_bytes(radiance.reshape(-1), _exposure_matrix(view), _rows(background), curve, p, _rows(out))
         return out
     for p, part, under in _blocks(radiance, background, view):
         if alpha:
@@ -88,7 +88,7 @@ def to_bytes(picture: Float32) -> Bytes:
     return out
 
 
-def exposure_matrix(view: ViewTransform) -> Float32:
+def _exposure_matrix(view: ViewTransform) -> Float32:
     """White balance and exposure in one matrix, (3, 3) float32: scene-linear to exposed light."""
     return (white_balance(view.temperature_k, view.tint) * (EXPOSURE * 2.0**view.exposure)).astype(np.float32)
 
@@ -125,7 +125,7 @@ def _blocks(radiance: Float32, background: Float32 | None, view: ViewTransform) 
     """Blocks of display-linear light, as `kernels_view` has them, the pixels that each block holds, and their background."""
     from viewsphere.rendering import kernels_view as kernels
 
-    rows, under, matrix = _rows(radiance), _rows(background), exposure_matrix(view)
+    rows, under, matrix = _rows(radiance), _rows(background), _exposure_matrix(view)
     p = np.zeros(4 * kernels.BLOCK, np.float32)
     light = p[: 3 * kernels.BLOCK]
     for first in range(0, len(rows), kernels.BLOCK):

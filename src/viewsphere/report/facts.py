@@ -17,7 +17,7 @@ PAUSE = 600.0
 
 
 @dataclass(frozen=True)
-class Timing:
+class _Timing:
     """The times at which frames were finished, from the times of their files.
 
     `first` and `last` are in ISO 8601 (UTC). `seconds` is the working time between them, without breaks; `frames` were finished
@@ -42,7 +42,7 @@ def finished(dataset: Dataset) -> list[tuple[float, int]]:
     return moments
 
 
-def timing(found: list[tuple[float, int]]) -> Timing | None:
+def _timing(found: list[tuple[float, int]]) -> _Timing | None:
     """Return the times at which shots were written, from the result of `finished`; None if no shot is finished."""
     if not found:
         return None
@@ -50,7 +50,7 @@ def timing(found: list[tuple[float, int]]) -> Timing | None:
     times, counts = np.array([t for t, _ in found]), np.array([n for _, n in found])
     gaps = np.diff(times)
     working = gaps < PAUSE
-    return Timing(
+    return _Timing(
         first=_iso(times[0]),
         last=_iso(times[-1]),
         seconds=round(float(gaps[working].sum()), 3),
@@ -62,7 +62,7 @@ def timing(found: list[tuple[float, int]]) -> Timing | None:
 def facts(dataset: Dataset, times: list[tuple[float, int]]) -> dict[str, Any]:
     """Recipe (YAML), plan, versions, timing (from what `finished` gives) and the folder's name, as plain data."""
     plan = dataset.plan
-    rendering = timing(times)
+    rendering = _timing(times)
     return {
         "name": dataset.name,
         "folder": dataset.root.resolve().name,

@@ -43,7 +43,7 @@ def read_small(glb: Path, most: int, node: str | None = None) -> SmallMesh:
 
     mesh = load_model(glb, node=node)[0]
     vertices = mesh.vertices.astype(np.float64)[:, (0, 2, 1)] * (1, -1, 1)  # the file has +y up and the front at +z
-    return simplified(vertices, mesh.triangles.astype(np.int64), triangle_colors(mesh), most)
+    return simplified(vertices, mesh.triangles.astype(np.int64), _triangle_colors(mesh), most)
 
 
 def simplified(vertices: Float, triangles: NDArray[np.int64], colors: NDArray[np.uint8], most: int) -> SmallMesh:
@@ -122,7 +122,7 @@ def _representatives(
     return np.clip(mean + shift, low, low + cell)
 
 
-def triangle_colors(mesh: Mesh) -> NDArray[np.uint8]:
+def _triangle_colors(mesh: Mesh) -> NDArray[np.uint8]:
     """The base colour at the middle of each triangle, (T, 3) uint8 sRGB: factor, texture and vertex colours."""
     factors = np.array([m.base_color[:3] for m in mesh.materials], np.float64)
     linear = factors[mesh.triangle_material]

@@ -221,15 +221,15 @@ def _coordinates(sample: Sample, scale: Scale, within: Mapping[str, Extent]) -> 
 
 
 def _parts(sample: Sample, scale: Scale, within: Mapping[str, Extent]) -> Layer:
-    return Layer(webp(part_colors(_thinned(sample.channels["parts"], scale.layer_width)), 60))
+    return Layer(webp(_part_colors(_thinned(sample.channels["parts"], scale.layer_width)), 60))
 
 
 def _materials(sample: Sample, scale: Scale, within: Mapping[str, Extent]) -> Layer:
-    return Layer(webp(part_colors(_thinned(sample.channels["materials"], scale.layer_width)), 60))
+    return Layer(webp(_part_colors(_thinned(sample.channels["materials"], scale.layer_width)), 60))
 
 
 def _body_parts(sample: Sample, scale: Scale, within: Mapping[str, Extent]) -> Layer:
-    return Layer(webp(part_colors(_thinned(sample.channels["body_parts"], scale.layer_width)), 60))
+    return Layer(webp(_part_colors(_thinned(sample.channels["body_parts"], scale.layer_width)), 60))
 
 
 def _beside(name: str) -> Painter:
@@ -259,7 +259,7 @@ def _disparity(sample: Sample, scale: Scale, within: Mapping[str, Extent]) -> La
     thin = _thinned(disparity, scale.layer_width)
     known = np.isfinite(thin)
     share = np.clip((np.where(known, thin, far) - far) / max(near - far, 1e-9), 0, 1)
-    return Layer(webp(_rgba(viridis(share), known), 75), (near, far))
+    return Layer(webp(_rgba(_viridis(share), known), 75), (near, far))
 
 
 def _flow_state(sample: Sample, scale: Scale, within: Mapping[str, Extent]) -> Layer:
@@ -314,10 +314,10 @@ def webp(picture: Picture, quality: int, method: int = 4) -> bytes:
 def depth_colors(depth: NDArray[np.float32]) -> tuple[float, float, Picture]:
     """Near and far metres, and the depth between them in viridis, near light, (H, W, 4); clear where nothing is hit."""
     near, far = depth_extent(depth)
-    return near, far, _rgba(viridis(nearness(depth, (near, far))), np.isfinite(depth))
+    return near, far, _rgba(_viridis(nearness(depth, (near, far))), np.isfinite(depth))
 
 
-def viridis(share: NDArray[np.floating]) -> Picture:
+def _viridis(share: NDArray[np.floating]) -> Picture:
     """Colours (..., 3) of shares from 0 (dark) to 1 (light)."""
     steps = np.arange(len(VIRIDIS)) / (len(VIRIDIS) - 1)
     return np.stack([np.interp(share, steps, VIRIDIS[:, c]) for c in range(3)], axis=-1).round().astype(np.uint8)
@@ -346,7 +346,7 @@ def coordinate_colors(
     return _rgba(colors, known)
 
 
-def part_colors(parts: NDArray[np.int32]) -> Picture:
+def _part_colors(parts: NDArray[np.int32]) -> Picture:
     """A colour for each part id, (H, W, 4); neighbouring ids differ."""
     return _rgba(PART_COLORS[(parts - 1) % len(PART_COLORS)], parts > 0)
 

@@ -73,7 +73,7 @@ class FrameTable:
 
 
 @dataclass(frozen=True)
-class Names:
+class _Names:
     """Names in order of appearance, and the number of each."""
 
     codes: dict[str, int] = field(default_factory=dict[str, int])
@@ -120,7 +120,7 @@ class Columns:
 
     def __init__(self) -> None:
         self._frames, self._objects = Rows(FRAME), Rows(OBJECT)
-        self._splits, self._subjects, self._models, self._poses = Names(), Names(), Names(), Names()
+        self._splits, self._subjects, self._models, self._poses = _Names(), _Names(), _Names(), _Names()
 
     @property
     def table(self) -> FrameTable:
@@ -169,7 +169,7 @@ def _table(dataset: Dataset, chunk: tuple[int, int]) -> FrameTable:
 
 def table_of(samples: Iterable[Sample]) -> FrameTable:
     """The columns of some samples."""
-    splits, subjects, models, poses = Names(), Names(), Names(), Names()
+    splits, subjects, models, poses = _Names(), _Names(), _Names(), _Names()
     frames: list[tuple[float, ...]] = []
     objects: list[tuple[float, ...]] = []
     for row, sample in enumerate(samples):

@@ -71,7 +71,7 @@ class Frames(Shown, Iterable[Sample]):
         """Number of frames in a loop, for this shard or rank only; raises TypeError if loops are endless."""
         if self._epochs is None:
             raise TypeError("frames of epochs=None have no end, and no length")
-        units = RenderUnits(self.plan)
+        units = _RenderUnits(self.plan)
         shard = self._shard or shard_of_rank()
         return self._epochs * (self.plan.frames if shard.of == 1 else shard.size(len(units)) * (self.plan.frames // len(units)))
 
@@ -102,7 +102,7 @@ class Frames(Shown, Iterable[Sample]):
     def _epoch(self, epoch: int, shard: Shard) -> Iterator[Sample]:
         planned = self._drawn(epoch)
         whole = shard.of == 1 and not self._shuffle
-        units, seen = RenderUnits(planned, planned.shot_frames if whole else 1), set[str]()
+        units, seen = _RenderUnits(planned, planned.shot_frames if whole else 1), set[str]()
         framing = Framing(planned, planned, self._stages, self._stages.box)
         order = units.shuffled(epoch) if self._shuffle else units.in_order()
         for unit in shard(order):
@@ -161,7 +161,7 @@ def render(
 
 
 @dataclass(frozen=True, eq=False)
-class RenderUnits:
+class _RenderUnits:
     """The units in which loaders distribute and shuffle a plan: up to `most` poses of one subject, by all sensors, or a whole
     sequence, whose instants stay in order.
     """

@@ -245,7 +245,7 @@ class Index(Sequence[Row]):
         rows = range(first, end * chunks, self.shard.of)
         # Before the row q of a block are floor(q * size / chunks) of its positions, whichever subject it is of.
         before, until = (
-            floor_sum(len(rows), chunks, self.shard.of * block.size, row * block.size) for row in (first, first + 1)
+            _floor_sum(len(rows), chunks, self.shard.of * block.size, row * block.size) for row in (first, first + 1)
         )
         return (until - before) * block.each
 
@@ -282,7 +282,7 @@ class Index(Sequence[Row]):
         return dict(places)
 
 
-def floor_sum(count: int, divisor: int, step: int, start: int) -> int:
+def _floor_sum(count: int, divisor: int, step: int, start: int) -> int:
     """The sum of (start + i * step) // divisor for i in 0..count-1, all of them positive or 0, in as many steps as Euclid's
     algorithm takes for `divisor` and `step`.
     """

@@ -89,7 +89,7 @@ class Ring:
 
     def _held(self, things: Sequence[Thing], meshes: Sequence[Mesh], floor: Floor | None) -> _Room | None:
         for number, room in enumerate(self._rooms):
-            if room.floor == floor and next(changes(room.things, room.meshes, things, meshes), None) is None:
+            if room.floor == floor and next(_changes(room.things, room.meshes, things, meshes), None) is None:
                 return self._rooms.pop(number)
         return None
 
@@ -117,10 +117,10 @@ class Ring:
 
 def changed(before: Sequence[Thing], own: Sequence[Mesh], now: Sequence[Thing], meshes: Sequence[Mesh]) -> list[int]:
     """Return the indices of the still things that have moved, or have other meshes, between two lists of the same things."""
-    return list(changes(before, own, now, meshes))
+    return list(_changes(before, own, now, meshes))
 
 
-def changes(before: Sequence[Thing], own: Sequence[Mesh], now: Sequence[Thing], meshes: Sequence[Mesh]) -> Iterator[int]:
+def _changes(before: Sequence[Thing], own: Sequence[Mesh], now: Sequence[Thing], meshes: Sequence[Mesh]) -> Iterator[int]:
     """The indices of `changed`, one at a time, so the first one already shows that something changed."""
     if before is now and own is meshes:
         return

@@ -54,7 +54,7 @@ class RemotePath(Base):
         """The path of a URL; raises UserError for one with a password."""
         if _SECRET.search(re.sub(r":/+", "://", url)):
             raise UserError(
-                f"{shown(url)}: expected a URL without a password, which others would see; found one: give it where the "
+                f"{_shown(url)}: expected a URL without a password, which others would see; found one: give it where the "
                 "storage's own programs look for it (for s3://: AWS_PROFILE, or AWS_ACCESS_KEY_ID and AWS_SECRET_ACCESS_KEY)"
             )
         return cls(url)
@@ -221,7 +221,7 @@ class RemotePath(Base):
         try:
             self._asked("write", write)
         except FileNotFoundError as error:
-            why = f"expected to write, found: {shown(error)}: make the bucket, or correct its name"
+            why = f"expected to write, found: {_shown(error)}: make the bucket, or correct its name"
             raise RemoteError(f"{self}: {why}") from None
 
     def _lacking(self) -> FileNotFoundError:
@@ -240,12 +240,12 @@ class RemotePath(Base):
             except Exception as error:
                 if _is_refusal(error):
                     raise RemoteError(
-                        f"{self}: expected to be allowed to {what} it, found: {shown(error)}: see that the storage's "
+                        f"{self}: expected to be allowed to {what} it, found: {_shown(error)}: see that the storage's "
                         "credentials are set, and allow it"
                     ) from None
                 if tries == limits.MAX_REMOTE_TRIES:
                     raise RemoteError(
-                        f"{self}: expected to {what} it, found, {tries} times: {shown(error)}: what is finished is kept; run "
+                        f"{self}: expected to {what} it, found, {tries} times: {_shown(error)}: what is finished is kept; run "
                         "the same command again when the storage answers"
                     ) from None
             time.sleep(FIRST_WAIT_S * 3 ** (tries - 1))
@@ -289,7 +289,7 @@ class _Blocks(io.RawIOBase):
         return wanted
 
 
-def shown(error: object) -> str:
+def _shown(error: object) -> str:
     """An error or a URL in one line, without passwords."""
     text = " ".join(str(error).split()) or type(error).__name__
     return _SECRET.sub("://...@", text if isinstance(error, str) else f"{type(error).__name__}: {text}"[:300])
@@ -321,7 +321,7 @@ def _system(url: str) -> tuple[Any, str]:
             f"{url}: expected the packages that open {protocol}:// URLs, found: {error}: pip install '{extra}'"
         ) from None
     except ValueError as error:
-        raise UserError(f"{url}: expected a URL that fsspec opens, found: {shown(error)}: correct it") from None
+        raise UserError(f"{url}: expected a URL that fsspec opens, found: {_shown(error)}: correct it") from None
     if protocol == "s3":
         system.retries = 1
     return system, path

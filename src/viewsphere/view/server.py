@@ -112,7 +112,7 @@ class Server(ThreadingMixIn, TCPServer):
         if address.token is not None and not TOKEN.fullmatch(address.token):
             raise UserError("--token: use 16 to 256 letters, digits, - and _, or leave the option out to get a random token")
         self.token = address.token or secrets.token_urlsafe(24)
-        self.answers, self.address, self.lines = Answers(live), address, Lines()
+        self.answers, self.address, self.lines = Answers(live), address, _Lines()
         try:
             info = socket.getaddrinfo(address.host, address.port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE)[0]
             self.address_family = info[0]
@@ -184,7 +184,7 @@ class Server(ThreadingMixIn, TCPServer):
         print(printable(f"viewsphere: view: {type(error).__name__}: {error}"), file=sys.stderr)  # noqa: T201
 
 
-class Lines:
+class _Lines:
     """The open connections, each with the time at which the server began to wait for its request."""
 
     def __init__(self) -> None:

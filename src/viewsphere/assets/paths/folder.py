@@ -230,7 +230,7 @@ def decode_image(data: bytes, where: str, *, upright: bool = False) -> NDArray[n
             picture = Pillow.open(io.BytesIO(data), formats=IMAGE_FORMATS)
             width, height = picture.size
             if width * height <= limits.MAX_PICTURE_PIXELS:
-                return image_pixels(ImageOps.exif_transpose(picture) if upright else picture)
+                return _image_pixels(ImageOps.exif_transpose(picture) if upright else picture)
             found = f"{width} x {height}"
     except UnidentifiedImageError:
         raise UnreadableError(f"{where} is not an image in one of {', '.join(IMAGE_FORMATS)}, or has no pixels") from None
@@ -266,7 +266,7 @@ def _too_large(where: str, found: str) -> UnreadableError:
     )
 
 
-def image_pixels(picture: Any) -> NDArray[np.uint8]:
+def _image_pixels(picture: Any) -> NDArray[np.uint8]:
     """Pixels (H, W, 4) uint8 RGBA of a Pillow image; 16-bit channels keep their upper byte, floats run from 0 to 1."""
     from PIL import Image as Pillow
 

@@ -77,7 +77,7 @@ class Job:
         return cls(**fields | {"frames": tuple(fields["frames"])})
 
 
-def main() -> None:
+def _main() -> None:
     """Do the jobs of standard input."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the requesting process decides
     if FORKS:
@@ -276,4 +276,4 @@ def _limit(job: Job) -> None:
 
 
 if __name__ == "__main__":
-    main()
+    _main()

@@ -28,7 +28,7 @@ DEVICES = ("CPU", "CUDA", "OPTIX", "HIP", "METAL", "ONEAPI")
 ONLINE = ("socket.connect", "socket.getaddrinfo", "socket.gethostbyname", "socket.sendto", "socket.sendmsg")
 
 
-def main(folder: Path, readable: list[str] | None = None, threads: int = 0) -> None:
+def _main(folder: Path, readable: list[str] | None = None, threads: int = 0) -> None:
     """Answer requests until the input ends, then remove `folder`, which contains the requests' arrays.
 
     With `readable`, the process reads only these folders and the system's, and writes only to `folder`, if the system can
@@ -44,9 +44,9 @@ def main(folder: Path, readable: list[str] | None = None, threads: int = 0) -> N
     requests: SimpleQueue[bytes] = SimpleQueue()
     threading.Thread(target=_read, args=(requests, folder), daemon=True).start()
     with suppress(Exception), few_cores(threads):  # the first request is answered with the error
-        start_blender()
+        _start_blender()
     while True:
-        said = answer(requests.get())
+        said = _answer(requests.get())
         try:
             answers.write(said + b"\n")
             answers.flush()
@@ -63,14 +63,14 @@ def _bind(folder: Path, readable: list[str]) -> None:
     confine(readable, [str(folder)])
 
 
-def answer(request: bytes) -> bytes:
+def _answer(request: bytes) -> bytes:
     """One request's answer: `{"ok": value}`, or `{"error": "one line", "trace": "..."}`."""
     try:
         told = json.loads(request)
         do = told.pop("do", None)
         if do not in REQUESTS:
             raise ValueError(f"do: expected one of {', '.join(REQUESTS)}; found {do!r}")
-        start_blender()
+        _start_blender()
         return json.dumps({"ok": REQUESTS[do](told)}).encode()
     except (Exception, SystemExit) as error:
         traceback.print_exc()
@@ -79,7 +79,7 @@ def answer(request: bytes) -> bytes:
 
 
 @cache
-def start_blender() -> None:
+def _start_blender() -> None:
     """Import bpy and forbid files to run scripts or to use the network."""
     import bpy
 
@@ -229,4 +229,4 @@ REQUESTS: dict[str, Callable[[dict[str, Any]], Any]] = {
 }
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]), *map(json.loads, sys.argv[2:]))
+    _main(Path(sys.argv[1]), *map(json.loads, sys.argv[2:]))

@@ -24,10 +24,10 @@ class Options(Frozen):
     )
 
 
-def moves(options: Options, start: Start) -> Move:
+def _moves(options: Options, start: Start) -> Move:
     """A straight line, and a turn about one axis through the thing's origin."""
     velocity, spin = np.array(options.velocity), np.radians(options.spin_deg)
     return lambda time, pose: pose.turned(rotation_about(spin * time)).moved(velocity * time)
 
 
-MOTION = MotionSpec(options=Options, moves=moves)
+MOTION = MotionSpec(options=Options, moves=_moves)

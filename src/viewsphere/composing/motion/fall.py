@@ -20,7 +20,7 @@ class Options(Frozen):
     speed: Drawn[Positive] = Field(default=1.0, description="speed factor: 0.25 is slow motion")
 
 
-def moves(options: Options, start: Start) -> Move:
+def _moves(options: Options, start: Start) -> Move:
     """The simulated states, with linear interpolation between them. All things of a scene fell together, so that different
     options for them make them overlap.
     """
@@ -37,4 +37,4 @@ def moves(options: Options, start: Start) -> Move:
     return moved
 
 
-MOTION = MotionSpec(options=Options, moves=moves)
+MOTION = MotionSpec(options=Options, moves=_moves)

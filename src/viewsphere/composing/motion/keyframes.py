@@ -68,7 +68,7 @@ class Options(Frozen):
         return self
 
 
-def moves(options: Options, start: Start) -> Move:
+def _moves(options: Options, start: Start) -> Move:
     """Positions in straight lines; rotations by slerp, the shorter way around at a constant rate (Shoemake 1985)."""
     positions = [(key.time, np.array(key.position)) for key in options.keys if key.position is not None]
     turns = [(key.time, turn) for key in options.keys if (turn := _quaternion(key)) is not None]
@@ -108,4 +108,4 @@ def _quaternion(key: Key) -> Float | None:
     return quaternion_product(z, quaternion_product(y, x))
 
 
-MOTION = MotionSpec(options=Options, moves=moves)
+MOTION = MotionSpec(options=Options, moves=_moves)

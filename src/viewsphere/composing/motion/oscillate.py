@@ -28,7 +28,7 @@ class Options(Frozen):
     )
 
 
-def moves(options: Options, start: Start) -> Move:
+def _moves(options: Options, start: Start) -> Move:
     """A sine of position and angle."""
     side, turn = np.array(options.position), np.radians(options.rotation_deg)
     phase = math.radians(options.phase_deg)
@@ -40,4 +40,4 @@ def moves(options: Options, start: Start) -> Move:
     return moved
 
 
-MOTION = MotionSpec(options=Options, moves=moves)
+MOTION = MotionSpec(options=Options, moves=_moves)

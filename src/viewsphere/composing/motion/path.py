@@ -54,7 +54,7 @@ class Options(Frozen):
         return self
 
 
-def moves(options: Options, start: Start) -> Move:
+def _moves(options: Options, start: Start) -> Move:
     """The path by its arc length."""
     curve = _curve(options, start)
     if not curve.closed and options.offset > curve.length:
@@ -94,4 +94,4 @@ def _lane(name: str, start: Start) -> Lane:
     return lanes[name]
 
 
-MOTION = MotionSpec(options=Options, moves=moves)
+MOTION = MotionSpec(options=Options, moves=_moves)

@@ -26,7 +26,7 @@ class Options(Frozen):
     highest_hz: Drawn[Positive] = Field(default=0.5, description="highest frequency, hertz")
 
 
-def moves(options: Options, start: Start) -> Move:
+def _moves(options: Options, start: Start) -> Move:
     """Band-limited noise (`viewsphere.composing.noise`) of six components."""
     sides, turns = np.array(options.position), np.radians(options.rotation_deg)
     way = noise(start.rng("noise"), 6, options.highest_hz)
@@ -38,4 +38,4 @@ def moves(options: Options, start: Start) -> Move:
     return moved
 
 
-MOTION = MotionSpec(options=Options, moves=moves)
+MOTION = MotionSpec(options=Options, moves=_moves)

@@ -30,7 +30,7 @@ class Options(Frozen):
     )
 
 
-def moves(options: Options, start: Start) -> Move:
+def _moves(options: Options, start: Start) -> Move:
     """The centripetal Catmull-Rom curve (`viewsphere.geometry.curve`) by its arc length."""
     curve = curve_through(options.points, options.closed, f"{start.field}.points")
 
@@ -42,4 +42,4 @@ def moves(options: Options, start: Start) -> Move:
     return moved
 
 
-MOTION = MotionSpec(options=Options, moves=moves)
+MOTION = MotionSpec(options=Options, moves=_moves)

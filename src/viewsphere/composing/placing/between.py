@@ -37,7 +37,7 @@ class Options(Frozen):
     )
 
 
-def place(
+def _place(
     cast: Sequence[ModelSpec], room: Room, shapes: Sequence[Shape], views: Sequence[Camera], rng: Draws, options: Options
 ) -> Sequence[Matrix4]:
     """Poses turned at random, as near to the model as the gap allows, or a little farther; raises RecipeError if there is not
@@ -80,4 +80,4 @@ def place(
     return poses
 
 
-PLACER = PlacerSpec(options=Options, place=place)
+PLACER = PlacerSpec(options=Options, place=_place)

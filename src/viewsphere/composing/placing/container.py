@@ -38,19 +38,19 @@ class Options(Matter):
     )
 
 
-def place(
+def _place(
     cast: Sequence[ModelSpec], room: Room, shapes: Sequence[Shape], views: Sequence[Camera], rng: Draws, options: Options
 ) -> Sequence[Matrix4]:
     """Poses at rest in the box; raises RecipeError if the box is too small."""
     return poses_of(_fallen(cast, room, shapes, rng, options))
 
 
-def ways(cast: Sequence[ModelSpec], room: Room, shapes: Sequence[Shape], rng: Draws, options: Options) -> Sequence[Way]:
+def _ways(cast: Sequence[ModelSpec], room: Room, shapes: Sequence[Shape], rng: Draws, options: Options) -> Sequence[Way]:
     """Return the path of each falling thing."""
     return ways_of(_fallen(cast, room, shapes, rng, options))
 
 
-def around(cast: Sequence[ModelSpec], room: Room, shapes: Sequence[Shape], rng: Draws, options: Options) -> Sequence[Piece]:
+def _around(cast: Sequence[ModelSpec], room: Room, shapes: Sequence[Shape], rng: Draws, options: Options) -> Sequence[Piece]:
     """The box."""
     width, height, length = _size(shapes, rng, options)
     return [Piece(model_for("box"), (width, height, length), IDENTITY)]
@@ -104,4 +104,4 @@ def _check(cast: Sequence[ModelSpec], room: Room, shapes: Sequence[Shape], size:
         )
 
 
-PLACER = PlacerSpec(options=Options, place=place, ways=ways, around=around, is_slow=True, packages=("mujoco", "scipy"))
+PLACER = PlacerSpec(options=Options, place=_place, ways=_ways, around=_around, is_slow=True, packages=("mujoco", "scipy"))

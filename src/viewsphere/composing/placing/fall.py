@@ -39,14 +39,14 @@ class Options(Matter):
     )
 
 
-def place(
+def _place(
     cast: Sequence[ModelSpec], room: Room, shapes: Sequence[Shape], views: Sequence[Camera], rng: Draws, options: Options
 ) -> Sequence[Matrix4]:
     """Poses at rest, or in flight; raises RecipeError if things do not come to rest on the free surface."""
     return poses_of(_fallen(cast, room, shapes, rng, options))
 
 
-def ways(cast: Sequence[ModelSpec], room: Room, shapes: Sequence[Shape], rng: Draws, options: Options) -> Sequence[Way]:
+def _ways(cast: Sequence[ModelSpec], room: Room, shapes: Sequence[Shape], rng: Draws, options: Options) -> Sequence[Way]:
     """Return the path of each falling thing; empty where things are caught in flight."""
     return ways_of(_fallen(cast, room, shapes, rng, options)) if options.moment == "rest" else ()
 
@@ -80,4 +80,4 @@ def _top(free: Footprint, below: float) -> Board:
     return Board((x, y, -half), (float(free.half[0]), float(free.half[1]), half), turn)
 
 
-PLACER = PlacerSpec(options=Options, place=place, ways=ways, is_slow=True, packages=("mujoco", "scipy"))
+PLACER = PlacerSpec(options=Options, place=_place, ways=_ways, is_slow=True, packages=("mujoco", "scipy"))

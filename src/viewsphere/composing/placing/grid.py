@@ -13,7 +13,7 @@ from viewsphere.model.sensors.camera import Camera
 from viewsphere.plugins.placer import PlacerSpec
 
 
-def place(
+def _place(
     cast: Sequence[ModelSpec], room: Room, shapes: Sequence[Shape], views: Sequence[Camera], rng: Draws
 ) -> Sequence[Matrix4]:
     """Poses with the middle of each box in the middle of a cell, the room's gap between cells; a thing already in place has the
@@ -39,4 +39,4 @@ def _cells(count: int) -> list[tuple[int, int]]:
     return sorted(product(side, side), key=lambda cell: (cell[0] ** 2 + cell[1] ** 2, cell[1], cell[0]))[:count]
 
 
-PLACER = PlacerSpec(place=place)
+PLACER = PlacerSpec(place=_place)

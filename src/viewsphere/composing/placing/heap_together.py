@@ -17,11 +17,11 @@ class Options(Gaps):
     """Options of how closely models stand."""
 
 
-def place(
+def _place(
     cast: Sequence[ModelSpec], room: Room, shapes: Sequence[Shape], views: Sequence[Camera], rng: Draws, options: Options
 ) -> Sequence[Matrix4]:
     """Poses near the middle, or near things already in place; raises RecipeError if no spot is found for a model."""
     return scattered(cast, room, shapes, rng, options, free_spot)
 
 
-PLACER = PlacerSpec(options=Options, place=place)
+PLACER = PlacerSpec(options=Options, place=_place)

@@ -12,7 +12,7 @@ from viewsphere.model.sensors.camera import Camera
 from viewsphere.plugins.placer import PlacerSpec
 
 
-def place(
+def _place(
     cast: Sequence[ModelSpec], room: Room, shapes: Sequence[Shape], views: Sequence[Camera], rng: Draws
 ) -> Sequence[Matrix4]:
     """Poses at the room's spots, one for each of the cast.
@@ -25,4 +25,4 @@ def place(
     return checked(cast, room, shapes, poses)
 
 
-PLACER = PlacerSpec(place=place)
+PLACER = PlacerSpec(place=_place)

@@ -15,7 +15,7 @@ from viewsphere.model.sensors.camera import Camera
 from viewsphere.plugins.placer import PlacerSpec
 
 
-def place(
+def _place(
     cast: Sequence[ModelSpec], room: Room, shapes: Sequence[Shape], views: Sequence[Camera], rng: Draws
 ) -> Sequence[Matrix4]:
     """Poses, the room's gap between neighbours' boxes; raises RecipeError if the row leaves the free floor."""
@@ -36,4 +36,4 @@ def place(
     return checked(cast, room, shapes, poses)
 
 
-PLACER = PlacerSpec(place=place)
+PLACER = PlacerSpec(place=_place)

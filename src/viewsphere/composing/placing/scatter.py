@@ -40,7 +40,7 @@ class Options(Gaps):
     )
 
 
-def place(
+def _place(
     cast: Sequence[ModelSpec], room: Room, shapes: Sequence[Shape], views: Sequence[Camera], rng: Draws, options: Options
 ) -> Sequence[Matrix4]:
     """Poses, no two boxes, or hulls, nearer than the room's gap; raises RecipeError if no spot is found for one."""
@@ -77,4 +77,4 @@ def _within(floor: Footprint, reach: float) -> Footprint:
     return replace(floor, center=(low + high) / 2 @ floor.axes, half=(high - low) / 2)
 
 
-PLACER = PlacerSpec(options=Options, place=place)
+PLACER = PlacerSpec(options=Options, place=_place)

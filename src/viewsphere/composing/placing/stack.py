@@ -54,7 +54,7 @@ class _Pile:
     box: Float
 
 
-def place(
+def _place(
     cast: Sequence[ModelSpec], room: Room, shapes: Sequence[Shape], views: Sequence[Camera], rng: Draws, options: Options
 ) -> Sequence[Matrix4]:
     """Poses at rest; raises RecipeError if a pile collapses, or has no room."""
@@ -139,4 +139,4 @@ def _body(spec: ModelSpec, shape: Shape, slot: int, rng: Draws, options: Options
     return body_of([shape.hull], own.density, own.mass, Touch(own.friction, own.restitution))
 
 
-PLACER = PlacerSpec(options=Options, place=place, is_slow=True, packages=("mujoco", "scipy"))
+PLACER = PlacerSpec(options=Options, place=_place, is_slow=True, packages=("mujoco", "scipy"))

@@ -70,7 +70,7 @@ class _Roads:
     pavements: Float
 
 
-def place(
+def _place(
     cast: Sequence[ModelSpec], room: Room, shapes: Sequence[Shape], views: Sequence[Camera], rng: Draws, options: Options
 ) -> Sequence[Matrix4]:
     """Poses along the lanes, each in its lane's direction, walkers in either; raises RecipeError if the place has no lanes, or
@@ -191,4 +191,4 @@ def _steps(lanes: Sequence[Lane], reach: float) -> Float:
     return np.array(steps).reshape(-1, 7)
 
 
-PLACER = PlacerSpec(options=Options, place=place)
+PLACER = PlacerSpec(options=Options, place=_place)

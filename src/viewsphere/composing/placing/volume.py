@@ -40,7 +40,7 @@ class Options(Frozen):
     height: Drawn[Strength] = Field(default=0.0, description="height of that box above the floor, metres")
 
 
-def place(
+def _place(
     cast: Sequence[ModelSpec], room: Room, shapes: Sequence[Shape], views: Sequence[Camera], rng: Draws, options: Options
 ) -> Sequence[Matrix4]:
     """Poses turned about the vertical at random, with no two turned boxes nearer than the room's gap; raises RecipeError if no
@@ -107,4 +107,4 @@ def apart(a: Float, b: Float, gap: float) -> bool:
     return False
 
 
-PLACER = PlacerSpec(options=Options, place=place)
+PLACER = PlacerSpec(options=Options, place=_place)

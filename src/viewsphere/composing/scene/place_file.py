@@ -118,14 +118,14 @@ def _offers_of(text: str, state: tuple[int, int]) -> FileOffers:
 
     def ask() -> tuple[list[Any], tuple[Path, ...]]:
         mesh, facts = load(spec)
-        return levels_and_lanes(mesh, facts), facts.files
+        return _levels_and_lanes(mesh, facts), facts.files
 
     settings = spec.model_dump_json(include={"up", "forward", "unit", "confined"})
     path, inside = split_source(Path(spec.source))
     return _offers(path.name, cached_facts(path, f"place {json.dumps(inside)} {settings}", ask))
 
 
-def levels_and_lanes(mesh: Mesh, facts: FileFacts) -> list[dict[str, Any]]:
+def _levels_and_lanes(mesh: Mesh, facts: FileFacts) -> list[dict[str, Any]]:
     """Return the declarations of a normalised mesh and its file's facts as plain data: an entry for each marked object.
     The entries are in the mesh's axes.
     """

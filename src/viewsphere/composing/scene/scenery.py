@@ -39,8 +39,6 @@ TRIES = 200
 SCENERY = "scenery-"
 """Prefix of scenery's keys."""
 
-UPRIGHT: Matrix4 = ((1, 0, 0, 0), (0, 1, 0, 0), (0, 0, 1, 0), (0, 0, 0, 1))
-
 
 class Naming(Protocol):
     """The function that gives a piece of scenery the id of its category: 0 for the background's."""

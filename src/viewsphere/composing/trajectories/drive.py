@@ -37,7 +37,7 @@ class DrivePath(Moving):
 
 
 @dataclass(frozen=True, eq=False)
-class Drive:
+class _Drive:
     """Motion at constant speed, above the lane's middle or to its side."""
 
     entry: DrivePath
@@ -71,9 +71,9 @@ class Drive:
         return spline(lanes[name].points, lanes[name].closed)
 
 
-def trajectory(entry: DrivePath, folder: Path) -> Drive:
+def _trajectory(entry: DrivePath, folder: Path) -> _Drive:
     """The motion that an entry of a recipe means."""
-    return Drive(entry)
+    return _Drive(entry)
 
 
-TRAJECTORY = TrajectorySpec(options=DrivePath, trajectory=trajectory)
+TRAJECTORY = TrajectorySpec(options=DrivePath, trajectory=_trajectory)

@@ -46,7 +46,7 @@ class MastPost(Moving):
 
 
 @dataclass(frozen=True, eq=False)
-class Mast:
+class _Mast:
     """A rig that stays in place and turns with its target; overhead, it moves with the target."""
 
     entry: MastPost
@@ -65,9 +65,9 @@ class Mast:
         return tuple(posed(axes, point + above, point) for point in focus)
 
 
-def trajectory(entry: MastPost, folder: Path) -> Mast:
+def _trajectory(entry: MastPost, folder: Path) -> _Mast:
     """The motion that an entry of a recipe means."""
-    return Mast(entry)
+    return _Mast(entry)
 
 
-TRAJECTORY = TrajectorySpec(options=MastPost, trajectory=trajectory)
+TRAJECTORY = TrajectorySpec(options=MastPost, trajectory=_trajectory)

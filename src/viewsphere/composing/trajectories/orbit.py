@@ -73,7 +73,7 @@ class OrbitPath(Moving):
 
 
 @dataclass(frozen=True, eq=False)
-class Orbit:
+class _Orbit:
     """An orbit whose angles and distance change linearly with time."""
 
     entry: OrbitPath
@@ -108,9 +108,9 @@ def _drifted(drift: tuple[float, float], times: Float) -> list[float]:
     return [first + (last - first) * ((t - begin) / whole) for t in times.tolist()]
 
 
-def trajectory(entry: OrbitPath, folder: Path) -> Orbit:
+def _trajectory(entry: OrbitPath, folder: Path) -> _Orbit:
     """The motion that an entry of a recipe means."""
-    return Orbit(entry)
+    return _Orbit(entry)
 
 
-TRAJECTORY = TrajectorySpec(options=OrbitPath, trajectory=trajectory)
+TRAJECTORY = TrajectorySpec(options=OrbitPath, trajectory=_trajectory)

@@ -69,7 +69,7 @@ class SplinePath(Moving):
 
 
 @dataclass(frozen=True, eq=False)
-class Spline:
+class _Spline:
     """Motion along the curve at constant speed or, between two points with times, at the speed that these determine."""
 
     entry: SplinePath
@@ -98,9 +98,9 @@ class Spline:
         return self.curve.length * (times - times[0]) / whole if whole else np.zeros(len(times))
 
 
-def trajectory(entry: SplinePath, folder: Path) -> Spline:
+def _trajectory(entry: SplinePath, folder: Path) -> _Spline:
     """The motion that an entry of a recipe means."""
-    return Spline(entry)
+    return _Spline(entry)
 
 
-TRAJECTORY = TrajectorySpec(options=SplinePath, trajectory=trajectory)
+TRAJECTORY = TrajectorySpec(options=SplinePath, trajectory=_trajectory)

@@ -78,7 +78,7 @@ class WalkPath(Moving):
 
 
 @dataclass(frozen=True)
-class Stretch:
+class _Stretch:
     """A stretch from a time (seconds) on: its start, with a heading (radians, counter-clockwise from +Y) that changes by `rate`
     a second.
     """
@@ -102,7 +102,7 @@ class Stretch:
 
 
 @dataclass(frozen=True, eq=False)
-class Walk:
+class _Walk:
     """A walk whose steps move the eyes up and down, and at half the frequency to both sides."""
 
     entry: WalkPath
@@ -137,15 +137,15 @@ class Walk:
         places = np.array([(x, y, 0.0) for x, y, _ in offsets])
         return places, np.array([(-math.sin(h), math.cos(h), 0.0) for *_, h in offsets])
 
-    def _stretches(self) -> Iterator[Stretch]:
+    def _stretches(self) -> Iterator[_Stretch]:
         entry = self.entry
         assert entry.start is not None
-        now = Stretch(0.0, *entry.start, math.radians(entry.heading), 0.0)
+        now = _Stretch(0.0, *entry.start, math.radians(entry.heading), 0.0)
         yield now
         for turn in entry.turns:
             rate = math.copysign(math.radians(entry.turn_rate), turn.degrees)
             for begin, faster in ((turn.at, rate), (turn.at + abs(turn.degrees) / entry.turn_rate, 0.0)):
-                now = Stretch(begin, *now.offset_at(begin, entry.speed), faster)
+                now = _Stretch(begin, *now.offset_at(begin, entry.speed), faster)
                 yield now
 
     def _bob(self, walked: Float) -> tuple[Float, Float]:
@@ -155,9 +155,9 @@ class Walk:
         return sway, np.array([self.entry.bob * math.sin(2 * phase) for phase in strides])
 
 
-def trajectory(entry: WalkPath, folder: Path) -> Walk:
+def _trajectory(entry: WalkPath, folder: Path) -> _Walk:
     """The motion that an entry of a recipe means."""
-    return Walk(entry)
+    return _Walk(entry)
 
 
-TRAJECTORY = TrajectorySpec(options=WalkPath, trajectory=trajectory)
+TRAJECTORY = TrajectorySpec(options=WalkPath, trajectory=_trajectory)

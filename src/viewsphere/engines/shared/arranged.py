@@ -169,7 +169,7 @@ class Arrangements:
         if before is None or after is None or before == after:
             return nearest
         start, end = self.shown.mesh(thing, before, rest), self.shown.mesh(thing, after, rest)
-        return blended(start, end, share) or nearest
+        return _blended(start, end, share) or nearest
 
     def _meshes(self, things: tuple[Thing, ...]) -> tuple[Mesh, ...]:
         """The meshes of these things, at the time steps that they show."""
@@ -191,7 +191,7 @@ def _dressed(things: Sequence[Thing], meshes: Sequence[Mesh], soaked: float) -> 
     return tuple(found[id(mesh), thing.repaints] for thing, mesh in zip(things, meshes, strict=True))
 
 
-def blended(a: Mesh, b: Mesh, share: float) -> Mesh | None:
+def _blended(a: Mesh, b: Mesh, share: float) -> Mesh | None:
     """A mesh at a share of the way from one to another that differs only in shape, otherwise None."""
     if not differs_in_shape_only(a, b):
         return None

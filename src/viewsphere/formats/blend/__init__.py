@@ -55,13 +55,13 @@ def check() -> None:
     plugins.load(EngineSpec, ENGINE).check({})
 
 
-def refuses(scope: Scope) -> Iterator[str]:
+def _refuses(scope: Scope) -> Iterator[str]:
     """Reasons to refuse: no picture has a known camera and viewpoint."""
     yield from any_view(scope)
 
 
 @contextmanager
-def writer(dataset: Dataset, folder: Path, note: Callable[[str], None]) -> Generator[Callable[[Sample], None]]:
+def _writer(dataset: Dataset, folder: Path, note: Callable[[str], None]) -> Generator[Callable[[Sample], None]]:
     """Write the frames that have a camera; notes name everything that Blender's files cannot hold.
 
     Blender needs all frames of a scene at once. The writer therefore first notes only each frame's place. After the last frame
@@ -254,7 +254,7 @@ FORMAT = FormatSpec(
     channels=(),
     keeps_all_objects=True,  # hidden objects are part of a scene, too
     names_credits=False,
-    refuses=refuses,
+    refuses=_refuses,
     check=check,
-    writer=writer,
+    writer=_writer,
 )

@@ -98,14 +98,14 @@ SCENE = 1000
 """Numbers of still pictures in a scene, and of pictures in a shard."""
 
 
-def needs(options: Options) -> tuple[str, ...]:
+def _needs(options: Options) -> tuple[str, ...]:
     """The required labels: whole masks, which all layouts contain."""
     return ("amodal",)
 
 
-def refuses(scope: Scope, options: Options) -> Iterator[str]:
+def _refuses(scope: Scope, options: Options) -> Iterator[str]:
     """Reasons to refuse: unknown cameras, lenses that K does not describe, and objects without whole masks."""
-    yield from lacking_labels(scope, needs(options))
+    yield from lacking_labels(scope, _needs(options))
     yield from known_cameras(scope)
     yield from pinhole(scope)
 
@@ -227,8 +227,8 @@ FORMAT = FormatSpec(
     options=Options,
     channels=("rgb", "depth"),
     names_credits=False,
-    needs=needs,
-    refuses=refuses,
+    needs=_needs,
+    refuses=_refuses,
     writer=writer,
     preparer=preparer,
     verify=verify,

@@ -139,7 +139,7 @@ def _models(root: Path, frames: tuple[Frame, ...]) -> tuple[dict[str, SourceMode
 
 
 @dataclass(frozen=True)
-class Fit:
+class _Fit:
     """The shift in pixels to add to cx and cy so that masks fit. `differed` and `differs` are the shares of their pixels that
     differ from the models' pixels, without this shift and with it.
     """
@@ -149,13 +149,13 @@ class Fit:
     differs: float = 0.0
 
 
-def _fit(frames: Sequence[Frame], models: Mapping[str, SourceModel]) -> Fit:
+def _fit(frames: Sequence[Frame], models: Mapping[str, SourceModel]) -> _Fit:
     """The shift of whole masks against the models in their poses; zero if it is unclear or if there are no masks. Raises
     ModelError for unreadable models, StoreError for invalid masks.
     """
     masks = [(frame, n, mask) for frame, n in _chosen(frames) if np.count_nonzero(mask := _mask(frame, n)) >= LEAST]
     if not masks:
-        return Fit()
+        return _Fit()
 
     @cache
     def differ(shift: Shift) -> int:
@@ -170,7 +170,7 @@ def _fit(frames: Sequence[Frame], models: Mapping[str, SourceModel]) -> Fit:
             break
     pixels = sum(int(np.count_nonzero(mask)) for _, _, mask in masks)
     found = best if differ(best) < CLEARLY * differ(STARTS[0]) else STARTS[0]
-    return Fit(found, differ(STARTS[0]) / pixels, differ(found) / pixels)
+    return _Fit(found, differ(STARTS[0]) / pixels, differ(found) / pixels)
 
 
 def shifted(lens: Intrinsics, shift: Shift) -> Intrinsics:

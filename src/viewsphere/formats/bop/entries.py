@@ -59,7 +59,7 @@ def sensor(lens: Intrinsics, scale: float) -> dict[str, Any]:
     return {**k, "width": lens.width, "height": lens.height, "depth_scale": scale}
 
 
-def depth(sample: Sample, scale: float) -> NDArray[np.uint16]:
+def _depth(sample: Sample, scale: float) -> NDArray[np.uint16]:
     """Depth along z in steps of `scale` mm, (H, W); 0 for no depth or more than 65,535 steps."""
     metres = scale / MM
     steps = depth_steps(sample, metres)
@@ -67,8 +67,8 @@ def depth(sample: Sample, scale: float) -> NDArray[np.uint16]:
 
 
 def depth_file(sample: Sample, scale: float) -> Coded:
-    """The depth of `depth`, as a PNG."""
-    return Coded(sample.index, f"bop depth {scale!r}.png", lambda: encode_png(depth(sample, scale)))
+    """The depth of `_depth`, as a PNG."""
+    return Coded(sample.index, f"bop depth {scale!r}.png", lambda: encode_png(_depth(sample, scale)))
 
 
 def entries(sample: Sample, numbers: Mapping[str, int], scale: float) -> list[Entry]:
@@ -77,7 +77,7 @@ def entries(sample: Sample, numbers: Mapping[str, int], scale: float) -> list[En
     """
     if "depth" not in sample.channels:
         raise UserError(f"frame {sample.index}: expected channel depth; found none")
-    valid = depth(sample, scale) > 0
+    valid = _depth(sample, scale) > 0
     listed = ((o, inside) for o in sample.objects if (inside := _inside(sample, o)))
     return [
         Entry(pose(o, numbers), _info(o, inside, valid, sample.width, sample.height), o.amodal, o.rle) for o, inside in listed

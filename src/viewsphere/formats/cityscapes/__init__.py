@@ -70,12 +70,12 @@ class Options(Frozen):
     stereo: bool = Field(default=False, description="disparity of the left pictures, too; of a rig of two rectified cameras")
 
 
-def needs(options: Options) -> tuple[str, ...]:
+def _needs(options: Options) -> tuple[str, ...]:
     """Disparity on request."""
     return ("disparity",) if options.stereo else ()
 
 
-def refuses(scope: Scope, options: Options) -> Iterator[str]:
+def _refuses(scope: Scope, options: Options) -> Iterator[str]:
     """Reasons to refuse: rigs of several cameras other than a pair, lenses that camera.json cannot express, and more instances
     than ids.
     """
@@ -161,8 +161,8 @@ FORMAT = FormatSpec(
     options=Options,
     channels=("rgb", "instances", "semantic"),
     names_credits=False,
-    needs=needs,
-    refuses=refuses,
+    needs=_needs,
+    refuses=_refuses,
     writer=writer,
     preparer=preparer,
     verify=verify,

@@ -57,7 +57,7 @@ class Options(Frozen):
     kind: Literal["text", "binary"] = Field(default="text", description="`text`: .txt files; `binary`: .bin files")
 
 
-def refuses(scope: Scope, options: Options) -> Iterator[str]:
+def _refuses(scope: Scope, options: Options) -> Iterator[str]:
     """Reasons to refuse: unknown cameras, skew, lenses that OpenCV lacks, and splits named like a model's files."""
     yield from known_cameras(scope)
     yield from no_skew(scope)
@@ -155,7 +155,7 @@ FORMAT = FormatSpec(
     options=Options,
     channels=("rgb", "depth"),
     names_credits=False,
-    refuses=refuses,
+    refuses=_refuses,
     writer=writer,
     preparer=preparer,
     verify=verify,

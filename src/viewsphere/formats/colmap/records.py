@@ -28,7 +28,7 @@ def pose_of(R: Float, t: Float) -> Pose:
     return (*quaternion_from_matrix(R), *t.tolist())
 
 
-def lens_of(lens: Intrinsics) -> tuple[str, list[float]]:
+def _lens_of(lens: Intrinsics) -> tuple[str, list[float]]:
     """The name of a lens' model, and its parameters. Raises UserError for a lens without a model."""
     opencv = lens.lens.opencv
     if lens.skew or opencv is None:
@@ -53,12 +53,12 @@ class Camera:
 
     def text(self) -> str:
         """The record's line or lines in a text file."""
-        model, values = lens_of(self.lens)
+        model, values = _lens_of(self.lens)
         return _line(self.number, model, self.lens.width, self.lens.height, *values)
 
     def binary(self) -> bytes:
         """The record's bytes in a binary file."""
-        model, values = lens_of(self.lens)
+        model, values = _lens_of(self.lens)
         head = struct.pack("<IiQQ", self.number, MODELS[model], self.lens.width, self.lens.height)
         return head + struct.pack(f"<{len(values)}d", *values)
 

@@ -25,13 +25,13 @@ from viewsphere.plugins.format import FormatSpec
 from viewsphere.store import Dataset
 
 
-def check() -> None:
+def _check() -> None:
     """Raise MissingExtraError if pyarrow is missing."""
     arrow()
 
 
 @contextmanager
-def writer(
+def _writer(
     dataset: Dataset, folder: Path, note: Callable[[str], None], options: Options
 ) -> Generator[Callable[[Sample], None]]:
     """Write the files of all splits and the card.
@@ -59,7 +59,7 @@ FORMAT = FormatSpec(
     holds=("everything but maps of points",),
     read_by=("datasets",),
     options=Options,
-    check=check,
-    writer=writer,
+    check=_check,
+    writer=_writer,
     verify=verify,
 )

@@ -20,21 +20,21 @@ Feature = dict[str, Any]
 IMAGE: Feature = {"_type": "Image"}
 
 
-def value(dtype: str) -> Feature:
+def _value(dtype: str) -> Feature:
     """The type of a number or a text."""
     return {"dtype": dtype, "_type": "Value"}
 
 
-def several(feature: Feature, length: int = -1) -> Feature:
+def _several(feature: Feature, length: int = -1) -> Feature:
     """The type of a list, of any length by default."""
     return {"feature": feature, "length": length, "_type": "Sequence"}
 
 
-def array(*shape: int) -> Feature:
+def _array(*shape: int) -> Feature:
     """The type of an array of exact numbers."""
-    inner = value("float64")
+    inner = _value("float64")
     for size in reversed(shape):
-        inner = several(inner, size)
+        inner = _several(inner, size)
     return inner
 
 
@@ -49,15 +49,15 @@ class Columns:
         self._pictures = [name for name in kept if name in PICTURES or channels()[name].components == 1]
         self.left_out = [name for name in kept if name not in self._pictures]
         self.features: Feature = {
-            "index": value("int64"),
+            "index": _value("int64"),
             **{self._column(name): IMAGE for name in self._pictures},
-            **dict.fromkeys(("width", "height"), value("int32")),
-            **dict.fromkeys(("sequence", "sensor"), value("string")),
-            "instant": value("int32"),
-            "time": value("float64"),
+            **dict.fromkeys(("width", "height"), _value("int32")),
+            **dict.fromkeys(("sequence", "sensor"), _value("string")),
+            "instant": _value("int32"),
+            "time": _value("float64"),
             "camera": CAMERA,
             "pose": POSE,
-            "objects": {name: several(feature) for name, feature in self._of_objects().items()},
+            "objects": {name: _several(feature) for name, feature in self._of_objects().items()},
         }
 
     def _column(self, channel: str) -> str:
@@ -68,16 +68,16 @@ class Columns:
         for c in self._dataset.categories:  # imported categories may share a name
             names.setdefault(c.name if c.name not in names else f"{c.name} ({c.id})", c.id)
         return {
-            "id": value("int64"),
+            "id": _value("int64"),
             "category": {"names": list(names), "_type": "ClassLabel"},
-            "bbox": array(4),
-            "area": value("int64"),
-            **dict.fromkeys(("visibility", "truncation"), value("float64")),
-            **dict.fromkeys(("model", "track", "pose_category"), value("string")),
-            "box3d_camera": array(8, 3),
-            "box3d_pixels": array(8, 2),
-            "camera_from_object": array(4, 4),
-            "size": array(3),
+            "bbox": _array(4),
+            "area": _value("int64"),
+            **dict.fromkeys(("visibility", "truncation"), _value("float64")),
+            **dict.fromkeys(("model", "track", "pose_category"), _value("string")),
+            "box3d_camera": _array(8, 3),
+            "box3d_pixels": _array(8, 2),
+            "camera_from_object": _array(4, 4),
+            "size": _array(3),
         }
 
     def row(self, sample: Sample) -> tuple[dict[str, Any], int]:
@@ -113,11 +113,11 @@ class Columns:
 
 
 OF_SAMPLE = ("index", "width", "height", "sequence", "sensor", "instant", "time")
-LENS: Feature = {"model": value("string"), "coefficients": several(value("float64"))}
-CAMERA: Feature = {"K": array(3, 3), "R": array(3, 3), "t": array(3), "distortion": LENS}
+LENS: Feature = {"model": _value("string"), "coefficients": _several(_value("float64"))}
+CAMERA: Feature = {"K": _array(3, 3), "R": _array(3, 3), "t": _array(3), "distortion": LENS}
 POSE: Feature = {
-    **dict.fromkeys(("azimuth_deg", "elevation_deg", "distance", "tilt_deg"), value("float64")),
-    "category": value("string"),
+    **dict.fromkeys(("azimuth_deg", "elevation_deg", "distance", "tilt_deg"), _value("float64")),
+    "category": _value("string"),
 }
 
 

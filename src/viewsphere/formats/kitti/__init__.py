@@ -59,7 +59,7 @@ from viewsphere.formats.shared.writing.tree import functions
 from viewsphere.plugins.format import FormatSpec
 
 
-def refuses(scope: Scope, options: Options) -> Iterator[str]:
+def _refuses(scope: Scope, options: Options) -> Iterator[str]:
     """Reasons to refuse: unsupported lenses and names, rigs unlike KITTI's car and, for tracking, pictures outside
     sequences.
     """
@@ -85,7 +85,7 @@ FORMAT = FormatSpec(
     channels=("rgb",),
     lidar=True,
     names_credits=False,
-    refuses=refuses,
+    refuses=_refuses,
     writer=writer,
     preparer=preparer,
     verify=verify,

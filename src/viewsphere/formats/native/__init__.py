@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 # Plans call only `refuses`, so each function imports its code when it is called.
 
 
-def refuses(scope: Scope) -> Iterator[str]:
+def _refuses(scope: Scope) -> Iterator[str]:
     """Reasons to refuse: no picture has a known camera and viewpoint."""
     yield from any_view(scope)
 
@@ -69,7 +69,7 @@ FORMAT = FormatSpec(
     about=__doc__,
     holds=("poses", "3D boxes", "masks", "depth"),
     read_by=("any JSON reader",),
-    refuses=refuses,
+    refuses=_refuses,
     writer=writer,
     preparer=preparer,
     verify=verify,

@@ -45,13 +45,13 @@ def preparer(dataset: Dataset, folder: Path) -> Callable[[Sample], list[Entry]]:
 @contextmanager
 def writer(dataset: Dataset, folder: Path, note: Callable[[str], None]) -> Generator[Callable[[list[Entry]], None]]:
     """Write `dataset1.json`, and models."""
-    with poses(dataset, folder) as append:
+    with _poses(dataset, folder) as append:
         yield append
     dataset.link_models(folder / "MODELS")
 
 
 @contextmanager
-def poses(dataset: Dataset, folder: Path) -> Generator[Callable[[Sequence[Entry]], None]]:
+def _poses(dataset: Dataset, folder: Path) -> Generator[Callable[[Sequence[Entry]], None]]:
     """Write the file into this folder. Yields a function that appends a frame's entries.
 
     Entries wait in a temporary file, and their positions in an SQLite table, which moves to disk once it is long.
@@ -97,7 +97,7 @@ def _write_poses(file: IO[bytes], waiting: IO[bytes], places: Iterable[Place]) -
 def verify(dataset: Dataset, folder: Path, sampled: Collection[int]) -> Iterator[Remark]:
     """Yield every difference from the current export; no proof is limited to the `sampled` frames."""
     with temporary("native") as scratch_folder:
-        with poses(dataset, scratch_folder) as append:
+        with _poses(dataset, scratch_folder) as append:
             again = _expected(dataset, lambda entries: None)
             yield from check_files(dataset, folder, _expected(dataset, append), again, [FILE_NAME])
         yield from check_json(scratch_folder / FILE_NAME, folder / FILE_NAME, OPENED, lambda where, value: None)

@@ -72,7 +72,7 @@ FOLDERS = ("", "exports/mesh", "exports/poisson", "exports/tsdf", "exports")
 """The folders in which nerfstudio's users put meshes, relative to the folder of transforms.json."""
 
 
-def source_cameras(path: Path) -> SourceCameras:
+def _source_cameras(path: Path) -> SourceCameras:
     """Return every camera of a world's folder, or of one of its files. Pictures are required only if the file does not give w
     and h. Raises StoreError if there is no such file, and for a frame that lacks its lens or its pose.
     """
@@ -112,17 +112,17 @@ class Options(Frozen):
     masks: bool = Field(default=False, description="masks of the objects, as nerfstudio leaves out what is around them")
 
 
-def needs(options: Options) -> tuple[str, ...]:
+def _needs(options: Options) -> tuple[str, ...]:
     """Depth and objects on request."""
     depth = () if options.kind == SYNTHETIC else ("depth",)
     return (*depth, "instances") if options.masks else depth
 
 
-def refuses(scope: Scope, options: Options) -> Iterator[str]:
+def _refuses(scope: Scope, options: Options) -> Iterator[str]:
     """Reasons to refuse: unknown cameras, and lenses that the files cannot express."""
     if options.masks and options.kind != "nerfstudio":
         yield f"expected masks with kind nerfstudio; found {options.kind}"
-    yield from refusals.lacking_labels(scope, needs(options))
+    yield from refusals.lacking_labels(scope, _needs(options))
     yield from refusals.known_cameras(scope)
     cameras = dict(refusals.lenses(scope))
     problems = ((name, _lens_problem(lens, options.kind)) for name, lens in cameras.items())
@@ -210,13 +210,13 @@ FORMAT = FormatSpec(
     options=Options,
     channels=("rgb",),
     names_credits=False,
-    needs=needs,
-    refuses=refuses,
+    needs=_needs,
+    refuses=_refuses,
     writer=writer,
     preparer=preparer,
     verify=verify,
     read=read,
-    as_recipe=source_cameras,
+    as_recipe=_source_cameras,
 )
 
 

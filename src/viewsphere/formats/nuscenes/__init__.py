@@ -64,7 +64,7 @@ class Options(Frozen):
     )
 
 
-def refuses(scope: Scope, options: Options) -> Iterator[str]:
+def _refuses(scope: Scope, options: Options) -> Iterator[str]:
     """Reasons to refuse: still pictures, distorted lenses, and names that would coincide."""
     yield from sequences(scope)
     yield from unknown_shots(scope)
@@ -152,7 +152,7 @@ FORMAT = FormatSpec(
     lidar=True,
     keeps_all_objects=True,
     names_credits=False,
-    refuses=refuses,
+    refuses=_refuses,
     writer=writer,
     preparer=preparer,
     verify=verify,

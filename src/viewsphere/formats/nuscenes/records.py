@@ -46,7 +46,7 @@ def chain(instants: Sequence[int], instant: int, name: Callable[[int], str]) -> 
     return {"prev": "" if before is None else name(before), "next": "" if behind is None else name(behind)}
 
 
-def placed(matrix: Float) -> Record:
+def _placed(matrix: Float) -> Record:
     """A rigid matrix (4, 4) as a position and a quaternion."""
     return {"translation": matrix[:3, 3].tolist(), "rotation": list(quaternion_from_matrix(matrix[:3, :3]))}
 
@@ -54,12 +54,12 @@ def placed(matrix: Float) -> Record:
 def ego_from_sensor(rig: Rig, sensor: int) -> Record:
     """Return the pose of a sensor, by its place in the rig, in the ego's axes; a LiDAR's pose is turned to its own axes."""
     axes = np.eye(4) if rig.sensors[sensor].lidar is None else CAMERA_FROM_LIDAR
-    return placed(compose(compose(unmoved(CAMERA_FROM_LIDAR), mounted(rig, sensor)), axes))
+    return _placed(compose(compose(unmoved(CAMERA_FROM_LIDAR), mounted(rig, sensor)), axes))
 
 
 def world_from_ego(world_from_rig: Float) -> Record:
     """Return the pose of the ego in the world."""
-    return placed(compose(world_from_rig, CAMERA_FROM_LIDAR))
+    return _placed(compose(world_from_rig, CAMERA_FROM_LIDAR))
 
 
 def matrix_of(lens: Intrinsics) -> list[list[float]]:

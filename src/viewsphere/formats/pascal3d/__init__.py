@@ -65,17 +65,17 @@ from viewsphere.formats.shared.writing.tree import functions
 from viewsphere.plugins.format import FormatSpec
 
 
-def check() -> None:
+def _check() -> None:
     """Raise MissingExtraError if scipy is missing."""
     scipy_io("pascal3d")
 
 
-def needs(options: Options) -> tuple[str, ...]:
+def _needs(options: Options) -> tuple[str, ...]:
     """Labels on request."""
     return ("keypoints",) if options.anchors else ()
 
 
-def refuses(scope: Scope, options: Options) -> Iterator[str]:
+def _refuses(scope: Scope, options: Options) -> Iterator[str]:
     """Reasons to refuse: more categories or objects than 8 bits can number, and data that viewpoints cannot describe."""
     yield from no_viewpoints(scope)
     yield from most_categories(scope, MOST - len(CLASSES))
@@ -92,9 +92,9 @@ FORMAT = FormatSpec(
     options=Options,
     channels=("rgb",),
     names_credits=False,
-    needs=needs,
-    refuses=refuses,
-    check=check,
+    needs=_needs,
+    refuses=_refuses,
+    check=_check,
     writer=writer,
     preparer=preparer,
     verify=verify,

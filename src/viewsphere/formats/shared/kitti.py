@@ -27,7 +27,7 @@ class Car(NamedTuple):
     lidar: int | None = None
 
 
-def car_of(rig: Rig) -> Car | None:
+def _car_of(rig: Rig) -> Car | None:
     """The rig as KITTI's car; None for a rig with sensors other than a camera or a rectified pair, and at most one LiDAR."""
     cameras = [i for i, sensor in enumerate(rig.sensors) if sensor.lidar is None]
     lidars = [i for i, sensor in enumerate(rig.sensors) if sensor.lidar is not None]
@@ -41,14 +41,14 @@ def car_of(rig: Rig) -> Car | None:
 def other_cars(scope: Scope) -> Iterator[str]:
     """Yield the reasons why a data set's rig differs from KITTI's car, or lacks its points."""
     yield from pointless(scope)
-    if scope.rig is not None and car_of(scope.rig) is None:
+    if scope.rig is not None and _car_of(scope.rig) is None:
         found = ", ".join(sensor.name for sensor in scope.rig.sensors)
         yield f"expected a camera or a rectified pair, and one LiDAR at most; found {found}"
 
 
 def car_in(shot: Shot, name: str) -> Car:
     """The rig of a shot as KITTI's car. Raises UserError, with the format's name, for any other rig."""
-    car = car_of(shot.rig)
+    car = _car_of(shot.rig)
     if car is None:
         raise UserError(
             f"{name}: shot {shot.key}: expected a camera or a rectified pair, and at most one LiDAR. Choose another format"
@@ -118,17 +118,17 @@ DONT_CARE = "dont_care"
 
 def nobody_cares(region: Box) -> str:
     """The line of a region that evaluations leave out, without its end."""
-    numbers = " ".join(f"{number + 0.0:.9g}" for number in (NO_ANGLE, *inclusive(region), *NO_BOX))
+    numbers = " ".join(f"{number + 0.0:.9g}" for number in (NO_ANGLE, *_inclusive(region), *NO_BOX))
     return f"DontCare {NO_SHARE} {NO_SHARE} {numbers}"
 
 
 def row(o: ObjectAnnotation, kind: str, in_grades: bool) -> str:
     """A line of labels, without its end, for an object of this type; its truncation is a share or a grade."""
     assert o.box2d is not None
-    alpha, box = upright(o) if o.is_boxed else (NO_ANGLE, NO_BOX)
+    alpha, box = _upright(o) if o.is_boxed else (NO_ANGLE, NO_BOX)
     alpha = (o.source or {}).get("alpha", alpha)
     start = f"{kind} {_outside(o, in_grades):.6g} {_hidden(o)}"
-    return " ".join([start, *(f"{number + 0.0:.9g}" for number in (alpha, *inclusive(o.box2d), *box))])
+    return " ".join([start, *(f"{number + 0.0:.9g}" for number in (alpha, *_inclusive(o.box2d), *box))])
 
 
 def _outside(o: ObjectAnnotation, in_grades: bool) -> float:
@@ -152,13 +152,13 @@ def _hidden(o: ObjectAnnotation) -> int:
     return (hidden > PARTLY) + (hidden > LARGELY_HIDDEN)
 
 
-def inclusive(box: Box) -> Box:
+def _inclusive(box: Box) -> Box:
     """The first and the last column and row of half-open corners (x0, y0, x1, y1)."""
     x0, y0, x1, y1 = box
     return x0, y0, x1 - 1, y1 - 1
 
 
-def upright(o: ObjectAnnotation) -> tuple[float, tuple[float, ...]]:
+def _upright(o: ObjectAnnotation) -> tuple[float, tuple[float, ...]]:
     """alpha; and height, width, length, x, y, z (metres, camera axes, the middle of the bottom) and rotation_y (radians) of
     the object's box, set upright in the camera's axes around the same middle.
     """

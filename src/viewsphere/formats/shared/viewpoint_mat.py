@@ -102,12 +102,12 @@ def structs(rows: Sequence[Mapping[str, Any]]) -> NDArray[Any]:
     return found
 
 
-def nothing() -> NDArray[np.float64]:
+def _nothing() -> NDArray[np.float64]:
     """MATLAB's []."""
     return np.zeros((0, 0))
 
 
-def box(o: ObjectAnnotation) -> NDArray[np.float64]:
+def _box(o: ObjectAnnotation) -> NDArray[np.float64]:
     """A box's first and last pixels, counted from 1: x1, y1, x2, y2."""
     assert o.box2d is not None
     x0, y0, x1, y1 = o.box2d
@@ -155,15 +155,15 @@ class Cads:
         number = self._places.get(o.key) or said.get("cad_index")
         return {
             "class": o.category,
-            "bbox": box(o),
+            "bbox": _box(o),
             "truncated": float(said.get("truncated", o.truncation > TRUNCATED)),
             "occluded": float(said.get("occluded", inside > 0 and 1 - o.visibility / inside > OCCLUDED)),
             "difficult": float(said.get("difficult", 0)),
-            "cad_index": np.int32(number) if number else nothing(),
-            "anchors": anchors or nothing(),
+            "cad_index": np.int32(number) if number else _nothing(),
+            "anchors": anchors or _nothing(),
             "viewpoint": _said(said, seen) if motion is None else _viewpoint(o, sample, motion[:, 3], seen),
             "id": float(o.id),
-            "RT": nothing() if motion is None else motion,
+            "RT": _nothing() if motion is None else motion,
         }
 
     def _anchors(self, o: ObjectAnnotation) -> dict[str, dict[str, Any]]:
@@ -175,7 +175,7 @@ class Cads:
         names: Sequence[str] = o.keypoint_names
         return {
             fields.get(name, name): {
-                "location": place[None] + 0.5 if state == 0 or (said and np.isfinite(place).all()) else nothing(),
+                "location": place[None] + 0.5 if state == 0 or (said and np.isfinite(place).all()) else _nothing(),
                 "status": float(known.get(name, STATUS[int(state)])),
             }
             for name, place, state in zip(names, o.keypoints, o.keypoint_states, strict=True)
@@ -194,8 +194,10 @@ class Cads:
             row: dict[str, Any] = {"vertices": vertices, "faces": triangles + np.int32(1)}
             if has_points:
                 points, center = info.keypoints.points if info.keypoints else {}, info.box3d_object.mean(axis=0)
-                row["pnames"] = np.array([list(fields.values())], object) if fields else nothing()
-                row |= {its: np.array([points[name]]) - center if name in points else nothing() for name, its in fields.items()}
+                row["pnames"] = np.array([list(fields.values())], object) if fields else _nothing()
+                row |= {
+                    its: np.array([points[name]]) - center if name in points else _nothing() for name, its in fields.items()
+                }
             rows.append(row)
         return structs(rows)
 
@@ -240,7 +242,7 @@ def _camera_from_cad(o: ObjectAnnotation) -> NDArray[np.float64]:
 def _said(source: Mapping[str, Any], anchors: int) -> Any:
     """The unchanged viewpoint of an imported object with an unknown position; [] without a viewpoint."""
     known = source.get("viewpoint")
-    return {**known, "num_anchor": float(anchors)} if known else nothing()
+    return {**known, "num_anchor": float(anchors)} if known else _nothing()
 
 
 def _viewpoint(o: ObjectAnnotation, sample: Sample, place: NDArray[np.float64], anchors: int) -> dict[str, float]:

@@ -58,7 +58,7 @@ def check() -> None:
     film_encoder()
 
 
-def needs() -> tuple[str, ...]:
+def _needs() -> tuple[str, ...]:
     """The required labels: the joints."""
     return ("keypoints",)
 
@@ -87,7 +87,7 @@ FORMAT = FormatSpec(
     read_by=("scipy", "MATLAB"),
     channels=("rgb", "depth", "instances", "body_parts", "flow_backward", "normals"),
     names_credits=False,
-    needs=needs,
+    needs=_needs,
     refuses=refuses,
     check=check,
     writer=writer,

@@ -65,7 +65,7 @@ class Options(Frozen):
     )
 
 
-def refuses(scope: Scope, options: Options) -> Iterator[str]:
+def _refuses(scope: Scope, options: Options) -> Iterator[str]:
     """Reasons to refuse: lenses that a line of numbers cannot hold."""
     yield from known_cameras(scope)
     yield from no_skew(scope)
@@ -150,7 +150,7 @@ FORMAT = FormatSpec(
     options=Options,
     channels=("rgb", "depth"),
     names_credits=False,
-    refuses=refuses,
+    refuses=_refuses,
     writer=writer,
     preparer=preparer,
     verify=verify,

@@ -77,7 +77,7 @@ class Options(Frozen):
     )
 
 
-def needs(options: Options) -> tuple[str, ...]:
+def _needs(options: Options) -> tuple[str, ...]:
     """Return the motion of objects, and the additional channels of version 2."""
     return ("velocity", *(("flow_backward", "scene_flow", "scene_flow_backward") if options.version == "2" else ()))
 
@@ -179,7 +179,7 @@ FORMAT = FormatSpec(
     options=Options,
     channels=("rgb", "depth", "instances", "semantic", "flow"),
     names_credits=False,
-    needs=needs,
+    needs=_needs,
     refuses=refuses,
     writer=writer,
     preparer=preparer,

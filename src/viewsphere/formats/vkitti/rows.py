@@ -44,7 +44,7 @@ STILL = 1e-9
 UNKNOWN = "Unknown"
 
 
-class Stand(NamedTuple):
+class _Stand(NamedTuple):
     """The position and rotation of a box: the middle of its bottom, then rotation about y, x and z, radians."""
 
     place: tuple[float, float, float]
@@ -61,7 +61,7 @@ def extrinsics(camera: Camera) -> list[float]:
     return [*np.column_stack((product(camera.R, OURS), camera.t)).ravel().tolist(), 0, 0, 0, 1]
 
 
-def stand(axes: Float, bottom: Float) -> Stand:
+def _stand(axes: Float, bottom: Float) -> _Stand:
     """Return the position and rotation of an object in axes whose y points down; `axes` transforms from its model's axes to
     these.
     """
@@ -69,25 +69,25 @@ def stand(axes: Float, bottom: Float) -> Stand:
     x = math.asin(max(-1.0, min(1.0, -float(turned[1, 2]))))
     y = math.remainder(math.atan2(turned[0, 2], turned[2, 2]) - math.pi / 2, 2 * math.pi)
     place = bottom.mean(axis=0).tolist()
-    return Stand((place[0], place[1], place[2]), (y, x, math.atan2(turned[1, 0], turned[1, 1])))
+    return _Stand((place[0], place[1], place[2]), (y, x, math.atan2(turned[1, 0], turned[1, 1])))
 
 
-def in_camera(o: ObjectAnnotation) -> Stand:
+def _in_camera(o: ObjectAnnotation) -> _Stand:
     """Return the position and rotation of an object in the camera's axes."""
-    return stand(o.camera_from_object[:3, :3], Box3d(o.box3d_camera).faces["bottom"])
+    return _stand(o.camera_from_object[:3, :3], Box3d(o.box3d_camera).faces["bottom"])
 
 
-def in_world(o: ObjectAnnotation) -> Stand:
+def _in_world(o: ObjectAnnotation) -> _Stand:
     """Return the position and rotation of an object in the world whose y points down."""
-    return stand(product(OURS.T, o.world_from_object[:3, :3]), product(Box3d(o.box3d).faces["bottom"], OURS))
+    return _stand(product(OURS.T, o.world_from_object[:3, :3]), product(Box3d(o.box3d).faces["bottom"], OURS))
 
 
-def alpha(where: Stand) -> float:
+def _alpha(where: _Stand) -> float:
     """The angle at which the camera sees an object, radians in [-pi, pi]."""
     return math.remainder(where.turns[0] - math.atan2(where.place[0], where.place[2]), 2 * math.pi)
 
 
-def seen(sample: Sample) -> Iterator[tuple[ObjectAnnotation, tuple[int, int, int, int], float]]:
+def _seen(sample: Sample) -> Iterator[tuple[ObjectAnnotation, tuple[int, int, int, int], float]]:
     """The visible objects: first and last column, first and last row, and the visible share of this box."""
     for o in sample.objects:
         if o.box2d is not None:
@@ -95,7 +95,7 @@ def seen(sample: Sample) -> Iterator[tuple[ObjectAnnotation, tuple[int, int, int
             yield o, (x0, x1 - 1, y0, y1 - 1), o.area / ((x1 - x0) * (y1 - y0))
 
 
-def moves(o: ObjectAnnotation) -> bool:
+def _moves(o: ObjectAnnotation) -> bool:
     """Return whether an object moves in the world."""
     speeds = (o.velocity, o.angular_velocity)
     return any(speed is not None and float(np.abs(speed).max()) > STILL for speed in speeds)
@@ -111,32 +111,32 @@ def texts(sample: Sample, camera: int) -> dict[str, bytes]:
         "pose": b"",
         "info": b"",
     }
-    for o, box, share in seen(sample):
-        here, there = in_camera(o), in_world(o)
-        found["bbox"] += line(*at, o.id - 1, *box, o.area, o.truncation, share, moves(o))
-        found["pose"] += line(*at, o.id - 1, alpha(here), *o.size, *there.place, *there.turns, *here.place, *here.turns)
+    for o, box, share in _seen(sample):
+        here, there = _in_camera(o), _in_world(o)
+        found["bbox"] += line(*at, o.id - 1, *box, o.area, o.truncation, share, _moves(o))
+        found["pose"] += line(*at, o.id - 1, _alpha(here), *o.size, *there.place, *there.turns, *here.place, *here.turns)
     return found
 
 
 def tracked(sample: Sample, names: Names) -> bytes:
     """Return the lines that a frame adds to version 1.3.1's tracks."""
     rows = b""
-    for o, (left, right, top, bottom), share in seen(sample):
-        here, name = in_camera(o), names.things[o.category]
+    for o, (left, right, top, bottom), share in _seen(sample):
+        here, name = _in_camera(o), names.things[o.category]
         levels = (o.truncation > 0) + (o.truncation > 0.5), o.occlusion_level
-        box = (alpha(here), left, top, right, bottom, *o.size, *here.place, *here.turns)
-        told = (o.truncation, share, name, int(moves(o)), *looks(o))
+        box = (_alpha(here), left, top, right, bottom, *o.size, *here.place, *here.turns)
+        told = (o.truncation, share, name, int(_moves(o)), *_looks(o))
         rows += line(sample.instant, o.id - 1, name, *levels, *box, *told)
     return rows
 
 
-def looks(o: ObjectAnnotation) -> tuple[str, str]:
+def _looks(o: ObjectAnnotation) -> tuple[str, str]:
     """The names of an object's model and of its colour, each a word."""
     model, color = o.track or o.key, o.extra.get("color")
-    return word(model), word(color or UNKNOWN)
+    return _word(model), _word(color or UNKNOWN)
 
 
-def word(text: str) -> str:
+def _word(text: str) -> str:
     """A text without spaces."""
     return "_".join(text.split()) or UNKNOWN
 
@@ -146,7 +146,7 @@ def infos(sample: Sample, names: Names) -> Iterator[str]:
     once.
     """
     for o in sample.objects:
-        yield f"={o.id - 1} {names.things[o.category]} {' '.join(looks(o))}"
+        yield f"={o.id - 1} {names.things[o.category]} {' '.join(_looks(o))}"
 
 
 def encodings(sample: Sample, names: Names) -> Iterator[str]:

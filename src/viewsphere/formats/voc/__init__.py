@@ -49,7 +49,7 @@ NAMES = r"[^:#\x00-\x1f][^:\x00-\x1f]*"
 """Allowed names of categories, for XML and for a line of labelmap.txt."""
 
 
-def refuses(scope: Scope, options: Options) -> Iterator[str]:
+def _refuses(scope: Scope, options: Options) -> Iterator[str]:
     """Reasons to refuse: more categories or objects than 8 bits can number, and names that the files cannot hold."""
     yield from most_categories(scope, MOST)
     yield from most_objects(scope, MOST)
@@ -66,7 +66,7 @@ FORMAT = FormatSpec(
     options=Options,
     channels=("rgb",),
     names_credits=False,
-    refuses=refuses,
+    refuses=_refuses,
     writer=writer,
     preparer=preparer,
     verify=verify,

@@ -300,12 +300,12 @@ class Lens:
         i = self.intrinsics
         column, row = (int(np.clip(v, 0, most - 1)) for v, most in ((i.cx, i.width), (i.cy, i.height)))
         strips = (0, row, i.width, row + 1), (column, 0, column + 1, i.height)
-        angles = [angles_off_axis(self.directions(1, strip).reshape(-1, 3)) for strip in strips]
+        angles = [_angles_off_axis(self.directions(1, strip).reshape(-1, 3)) for strip in strips]
         across, down = (float(np.nanmax(a[: len(a) // 2]) + np.nanmax(a[len(a) // 2 :])) for a in angles)
         return across, down
 
 
-def angles_off_axis(directions: Float) -> Float:
+def _angles_off_axis(directions: Float) -> Float:
     """Angles of directions (N, 3) to the optical axis, degrees."""
     return np.degrees(np.arctan2(np.hypot(directions[:, 0], directions[:, 1]), directions[:, 2]))
 

@@ -29,7 +29,7 @@ class BrownConrady(LensParameters, frozen=True):
         return self
 
 
-def rays(lens: Lens, xy: Float) -> Rays:
+def _rays(lens: Lens, xy: Float) -> Rays:
     """Undistorted rays of z = 1; NaN beyond the range in which the lens map is one-to-one."""
     from viewsphere.geometry.lenses.shared import kernels_lens as kernels
 
@@ -38,7 +38,7 @@ def rays(lens: Lens, xy: Float) -> Rays:
     return central(out)
 
 
-def project(lens: Lens, points: Float) -> Float:
+def _project(lens: Lens, points: Float) -> Float:
     """Positions of points with z > 0 within the limit."""
     from viewsphere.geometry.lenses.shared import kernels_lens as kernels
 
@@ -47,7 +47,7 @@ def project(lens: Lens, points: Float) -> Float:
     return lens.positions(*out.T)
 
 
-def bounds(
+def _bounds(
     lens: Lens, R: Float, t: Float, vertices: Float, is_used: NDArray[np.bool_], triangles: NDArray[np.int32]
 ) -> tuple[Bounds | None, bool]:
     """The box of the bent edges, to 1e-5 px; triangles are cut at the limit."""
@@ -57,7 +57,7 @@ def bounds(
     return bent_bounds(bent, R, t, vertices, is_used, triangles)
 
 
-def as_opencv(lens: Any) -> OpenCVLens:
+def _as_opencv(lens: Any) -> OpenCVLens:
     """The coefficients, unchanged."""
     return OpenCVLens(False, lens.parameters.coefficients)
 
@@ -113,9 +113,9 @@ def _tangential_limit(numerator: Float, denominator: Float, slope: Float, tangen
 
 LENS = LensSpec(
     parameters=BrownConrady,
-    rays=rays,
-    project=project,
+    rays=_rays,
+    project=_project,
     has_unit_rays=False,
-    bounds=bounds,
-    as_opencv=as_opencv,
+    bounds=_bounds,
+    as_opencv=_as_opencv,
 )

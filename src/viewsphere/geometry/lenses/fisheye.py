@@ -29,47 +29,47 @@ class Fisheye(LensParameters, frozen=True):
         return self
 
 
-def rays(lens: Lens, xy: Float) -> Rays:
+def _rays(lens: Lens, xy: Float) -> Rays:
     """Unit rays, which may point sideways or back; NaN beyond the largest angle."""
     from viewsphere.geometry.lenses.shared import kernels_lens as kernels
 
     k, out = lens.parameters.coefficients, np.empty((len(xy), 3))
-    kernels.rays_fisheye(np.array(k), limit(k), lens.intrinsics.K, xy, out)
+    kernels.rays_fisheye(np.array(k), _limit(k), lens.intrinsics.K, xy, out)
     return central(out)
 
 
-def project(lens: Lens, points: Float) -> Float:
+def _project(lens: Lens, points: Float) -> Float:
     """Positions of points up to the largest angle, including points behind the camera."""
     from viewsphere.geometry.lenses.shared import kernels_lens as kernels
 
     k, out = lens.parameters.coefficients, np.empty((len(points), 2))
-    kernels.distort_fisheye(np.array(k), limit(k), points, out)
+    kernels.distort_fisheye(np.array(k), _limit(k), points, out)
     return lens.positions(*out.T)
 
 
-def bounds(
+def _bounds(
     lens: Lens, R: Float, t: Float, vertices: Float, is_used: NDArray[np.bool_], triangles: NDArray[np.int32]
 ) -> tuple[Bounds | None, bool]:
     """The box of the bent edges, to 1e-5 px; triangles are cut at the limit."""
     k = lens.parameters.coefficients
-    return bent_bounds(BentLens(True, k, limit(k), lens.intrinsics.K), R, t, vertices, is_used, triangles)
+    return bent_bounds(BentLens(True, k, _limit(k), lens.intrinsics.K), R, t, vertices, is_used, triangles)
 
 
-def focal(fov: float, extent: float) -> float:
+def _focal(fov: float, extent: float) -> float:
     """The focal length without coefficients: the distance from the centre is this length times the angle."""
     return extent / fov
 
 
-def as_opencv(lens: Any) -> OpenCVLens:
+def _as_opencv(lens: Any) -> OpenCVLens:
     """The coefficients, unchanged."""
     return OpenCVLens(True, lens.parameters.coefficients)
 
 
 @lru_cache(maxsize=64)
-def limit(k: tuple[float, ...]) -> float:
+def _limit(k: tuple[float, ...]) -> float:
     """The largest angle, radians, up to which the radius rises with the angle, so that the lens map is one-to-one."""
     slope = np.array([9 * k[3], 7 * k[2], 5 * k[1], 3 * k[0], 1.0])
     return min(math.pi, math.sqrt(first_positive_root(slope)))
 
 
-LENS = LensSpec(parameters=Fisheye, rays=rays, project=project, bounds=bounds, focal=focal, as_opencv=as_opencv)
+LENS = LensSpec(parameters=Fisheye, rays=_rays, project=_project, bounds=_bounds, focal=_focal, as_opencv=_as_opencv)

@@ -19,7 +19,7 @@ class Pinhole(LensParameters, frozen=True):
     model: Literal["pinhole"] = "pinhole"
 
 
-def rays(lens: Lens, xy: Float) -> Rays:
+def _rays(lens: Lens, xy: Float) -> Rays:
     """Rays of z = 1."""
     i, out = lens.intrinsics, np.ones((len(xy), 3))
     out[:, 1] = (xy[:, 1] - i.cy) / i.fy
@@ -27,13 +27,13 @@ def rays(lens: Lens, xy: Float) -> Rays:
     return central(out)
 
 
-def project(lens: Lens, points: Float) -> Float:
+def _project(lens: Lens, points: Float) -> Float:
     """Positions of points in front of the camera."""
     z = np.where(points[:, 2] > 0, points[:, 2], np.nan)
     return lens.positions(points[:, 0] / z, points[:, 1] / z)
 
 
-def bounds(
+def _bounds(
     lens: Lens, R: Float, t: Float, vertices: Float, is_used: NDArray[np.bool_], triangles: NDArray[np.int32]
 ) -> tuple[Bounds | None, bool]:
     """The box of the corners; triangles that cross the plane z = NEAR of the camera are cut there."""
@@ -47,25 +47,25 @@ def bounds(
     return ((x0, y0, x1, y1) if x0 <= x1 else None), bool(whole)
 
 
-def field_of_view(lens: Lens) -> tuple[float, float]:
+def _field_of_view(lens: Lens) -> tuple[float, float]:
     """Angles through the principal point."""
     i = lens.intrinsics
     across = math.atan(i.cx / i.fx) + math.atan((i.width - i.cx) / i.fx)
     return math.degrees(across), math.degrees(math.atan(i.cy / i.fy) + math.atan((i.height - i.cy) / i.fy))
 
 
-def as_opencv(lens: Any) -> OpenCVLens:
+def _as_opencv(lens: Any) -> OpenCVLens:
     """No coefficients."""
     return OpenCVLens(False, ())
 
 
 LENS = LensSpec(
     parameters=Pinhole,
-    rays=rays,
-    project=project,
+    rays=_rays,
+    project=_project,
     has_unit_rays=False,
     is_linear=True,
-    bounds=bounds,
-    field_of_view=field_of_view,
-    as_opencv=as_opencv,
+    bounds=_bounds,
+    field_of_view=_field_of_view,
+    as_opencv=_as_opencv,
 )

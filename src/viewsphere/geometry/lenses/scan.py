@@ -44,7 +44,7 @@ class Scan(LensParameters, frozen=True):
         return (self.turn_deg, *self.elevations_deg)
 
 
-def rays(lens: Lens, xy: Float) -> Rays:
+def _rays(lens: Lens, xy: Float) -> Rays:
     """Unit rays; NaN beyond a full turn around the scan's middle, and beyond straight up and down."""
     from viewsphere.geometry.lenses.shared import kernels_lens as kernels
 
@@ -53,7 +53,7 @@ def rays(lens: Lens, xy: Float) -> Rays:
     return central(out)
 
 
-def project(lens: Lens, points: Float) -> Float:
+def _project(lens: Lens, points: Float) -> Float:
     """Positions of points in all directions except straight up and down."""
     from viewsphere.geometry.lenses.shared import kernels_lens as kernels
 
@@ -62,7 +62,7 @@ def project(lens: Lens, points: Float) -> Float:
     return lens.positions(*out.T)
 
 
-def bounds(
+def _bounds(
     lens: Lens, R: Float, t: Float, vertices: Float, is_used: NDArray[np.bool_], triangles: NDArray[np.int32]
 ) -> tuple[Bounds | None, bool]:
     """The box of azimuths and rows; the full circle if the triangles span it, or cross both the first and the last column."""
@@ -74,7 +74,7 @@ def bounds(
     return (i.fx * u0 + i.cx, i.fy * v0 + i.cy, i.fx * u1 + i.cx, i.fy * v1 + i.cy), True
 
 
-def field_of_view(lens: Lens) -> tuple[float, float]:
+def _field_of_view(lens: Lens) -> tuple[float, float]:
     """The angle across all columns, and the angle from the lowest to the highest ring."""
     rings = lens.parameters.elevations_deg
     return math.degrees(lens.intrinsics.width / lens.intrinsics.fx), rings[0] - rings[-1]
@@ -88,10 +88,10 @@ def _angles(scan: Scan) -> Float:
 
 LENS = LensSpec(
     parameters=Scan,
-    rays=rays,
-    project=project,
+    rays=_rays,
+    project=_project,
     is_scan=True,
-    bounds=bounds,
-    field_of_view=field_of_view,
+    bounds=_bounds,
+    field_of_view=_field_of_view,
     ray_cells=CELLS,
 )

@@ -82,7 +82,7 @@ def context_of(
         )
     sizes = real_sizes or [None if isinstance(thing.model.real_size, str) else thing.model.real_size for thing in objects]
     facts = [
-        Rendered(model, box, size, thing.model.category, thing.model.category_id, _track(thing, instant), said)
+        _Rendered(model, box, size, thing.model.category, thing.model.category_id, _track(thing, instant), said)
         for thing, box, model, size, said in zip(
             objects, boxes, models, sizes, metadata or [_unsaid] * len(objects), strict=True
         )
@@ -127,7 +127,7 @@ def sample_values(context: LabelContext, objects: Sequence[ObjectAnnotation]) ->
 
 
 @dataclass(frozen=True, eq=False)
-class Rendered:
+class _Rendered:
     """`ModelFacts` of a model that is rendered."""
 
     obj: str

@@ -17,7 +17,7 @@ from viewsphere.model.sample import ObjectAnnotation
 _OWN = frozenset(f.name for f in fields(ObjectAnnotation))
 
 
-def annotation_of(object_id: int, values: Iterable[Mapping[str, Any]], source: Mapping[str, Any] | None = None) -> Any:
+def _annotation_of(object_id: int, values: Iterable[Mapping[str, Any]], source: Mapping[str, Any] | None = None) -> Any:
     """The annotation with these fields; fields that `ObjectAnnotation` lacks go to `extra`."""
     own: dict[str, Any] = {}
     for some in values:
@@ -53,7 +53,7 @@ def from_whole_record(record: Mapping[str, Any], labels: Sequence[ObjectLabel]) 
     if type(record["id"]) is not int or record["id"] < 1:
         raise ValueError(f"object {record['id']!r:.40}: expected a number from 1 on")
     finite(record.get("source"))
-    return annotation_of(record["id"], [values], record.get("source"))
+    return _annotation_of(record["id"], [values], record.get("source"))
 
 
 def finite(source: Any) -> None:

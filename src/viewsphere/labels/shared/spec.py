@@ -42,7 +42,7 @@ Proof = Callable[[Sample, Models], Iterator[str]]
 """Yields a message for each value of a stored sample that contradicts the rest of the sample."""
 
 
-def no_proof(sample: Sample, models: Models) -> Iterator[str]:
+def _no_proof(sample: Sample, models: Models) -> Iterator[str]:
     """The proof of a label that nothing else in a sample can contradict; only recomputation proves it."""
     yield from ()
 
@@ -100,7 +100,7 @@ class LabelSpec(Spec):
     )
     options: type[Frozen] | None = described(default=None, description="the class of the options in a recipe's `labels`")
     prove: Proof = described(
-        default=no_proof,
+        default=_no_proof,
         description="`prove(sample, models)`: yields a message for each contradiction within a stored sample. `check` also "
         "recomputes every label",
     )
@@ -217,7 +217,7 @@ class ObjectLabel(LabelSpec):
         name: str,
         meaning: str,
         fields: Sequence[Field],
-        prove: Proof = no_proof,
+        prove: Proof = _no_proof,
         axes: str = "",
         drawing: Drawing | None = None,
         on_request: bool = False,

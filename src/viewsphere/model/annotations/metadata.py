@@ -10,7 +10,7 @@ from viewsphere.model.annotations.keypoints import Keypoints
 from viewsphere.model.annotations.symmetries import Symmetries
 
 
-def unknown() -> Appearance | None:
+def _unknown() -> Appearance | None:
     """None: the appearance of the model is unknown."""
     return None
 
@@ -29,4 +29,4 @@ class ModelMetadata:
     keypoints: Keypoints | None = None
     color: str | None = None
     material: str | None = None
-    looks: Callable[[], Appearance | None] = unknown
+    looks: Callable[[], Appearance | None] = _unknown

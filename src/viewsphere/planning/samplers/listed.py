@@ -26,7 +26,7 @@ from viewsphere.validation.errors import Nearest, one_of
 from viewsphere.validation.quantity import quantity
 
 
-def subjects(recipe: Recipe, specs: Sequence[ModelSpec]) -> tuple[str, ...]:
+def _subjects(recipe: Recipe, specs: Sequence[ModelSpec]) -> tuple[str, ...]:
     """The shots' names. Raises RecipeError, a line per error, for shots with models or splits that the recipe lacks."""
     _check(recipe)
     path, shots = _file(recipe)
@@ -54,22 +54,22 @@ def subjects(recipe: Recipe, specs: Sequence[ModelSpec]) -> tuple[str, ...]:
     return tuple(each(name, shots))
 
 
-def factors(context: SamplingContext) -> str:
+def _factors(context: SamplingContext) -> str:
     """The number of shots."""
     return f"{quantity(len(context.subjects), 'listed shot')} of {quantity(context.models, 'model')}"
 
 
-def blocks(context: SamplingContext) -> tuple[Block, ...]:
+def _blocks(context: SamplingContext) -> tuple[Block, ...]:
     """Every shot from its own camera, in the file's order."""
     return tuple(Block((name,), ((i, i + 1),)) for i, name in enumerate(context.subjects))
 
 
-def most_objects(recipe: Recipe) -> int:
+def _most_objects(recipe: Recipe) -> int:
     """Most models in a shot."""
     return max(len(shot.places) for shot in _file(recipe)[1])
 
 
-def cast(context: SamplingContext, subject: str, pose: int | None) -> tuple[ModelSpec, ...]:
+def _cast(context: SamplingContext, subject: str, pose: int | None) -> tuple[ModelSpec, ...]:
     """The models of a shot, in the order of their ids."""
     return tuple(context.spec(listed_object.model) for listed_object in _shots(context)[subject].said.objects)
 
@@ -81,7 +81,7 @@ def split(context: SamplingContext, subject: str, pose: int) -> str:
     return _shots(context)[subject].said.split or context.hashed_split(subject, pose)
 
 
-def standing(context: SamplingContext, subject: str, box_of: BoxOf) -> Iterator[Standing]:
+def _standing(context: SamplingContext, subject: str, box_of: BoxOf) -> Iterator[Standing]:
     """Nothing: the positions of listed cameras are intended, so they are not checked."""
     return iter(())
 
@@ -155,13 +155,13 @@ def _check(recipe: Recipe) -> None:
 
 
 SAMPLER = SamplerSpec(
-    subjects=subjects,
-    factors=factors,
-    blocks=blocks,
-    most_objects=most_objects,
-    cast=cast,
+    subjects=_subjects,
+    factors=_factors,
+    blocks=_blocks,
+    most_objects=_most_objects,
+    cast=_cast,
     split=split,
-    standing=standing,
+    standing=_standing,
     shot=shot,
     of_any_size=True,
 )

@@ -22,7 +22,7 @@ from viewsphere.store import Block
 from viewsphere.validation.quantity import quantity
 
 
-def subjects(recipe: Recipe, specs: Sequence[ModelSpec]) -> tuple[str, ...]:
+def _subjects(recipe: Recipe, specs: Sequence[ModelSpec]) -> tuple[str, ...]:
     """The models' keys."""
     if recipe.splits.by == "scene":
         raise RecipeError("splits.by: expected model, pose, place or frame beside models x poses; found scene: set scenes")
@@ -31,7 +31,7 @@ def subjects(recipe: Recipe, specs: Sequence[ModelSpec]) -> tuple[str, ...]:
     return tuple(spec.key for spec in specs)
 
 
-def factors(context: SamplingContext) -> str:
+def _factors(context: SamplingContext) -> str:
     """Models, time steps and poses."""
     if not context.timings:
         return f"{quantity(context.models, 'model')} x {quantity(len(context.pose_list), 'pose')}"
@@ -57,22 +57,22 @@ def blocks(context: SamplingContext) -> tuple[Block, ...]:
     return tuple(blocks)
 
 
-def most_objects(recipe: Recipe) -> int:
+def _most_objects(recipe: Recipe) -> int:
     """The number of models: one and its company."""
     return 1 + (recipe.scene.company.number if recipe.scene.company else 0)
 
 
-def cast(context: SamplingContext, subject: str, pose: int | None) -> tuple[ModelSpec, ...]:
+def _cast(context: SamplingContext, subject: str, pose: int | None) -> tuple[ModelSpec, ...]:
     """The model and its company; without a pose, the model alone if company is drawn for each frame."""
     return context.with_company(subject, pose)
 
 
-def split(context: SamplingContext, subject: str, pose: int) -> str:
+def _split(context: SamplingContext, subject: str, pose: int) -> str:
     """The model's split, or one drawn from the pose, place or name."""
     return context.dealt_splits[subject] if context.recipe.splits.by == "model" else context.hashed_split(subject, pose)
 
 
-def standing(context: SamplingContext, subject: str, box_of: BoxOf) -> Iterator[Standing]:
+def _standing(context: SamplingContext, subject: str, box_of: BoxOf) -> Iterator[Standing]:
     """The model and its company at each time step; the model alone where company is drawn for each frame."""
     spec = context.spec(subject)
     things, target = (Thing(id=1, model=spec),), None
@@ -89,7 +89,7 @@ def standing(context: SamplingContext, subject: str, box_of: BoxOf) -> Iterator[
         yield Standing(_at(context, things, run), at, context.pose_list.for_subject(subject), range(run.first, run.stop))
 
 
-def shot(context: SamplingContext, subject: str, poses: Sequence[int], box_of: BoxOf, key: str, first: int) -> Shot:
+def _shot(context: SamplingContext, subject: str, poses: Sequence[int], box_of: BoxOf, key: str, first: int) -> Shot:
     """The shot of a model with company and scenery, from poses of one time step."""
     spec = context.spec(subject)
     things, target = (Thing(id=1, model=spec),), None
@@ -110,7 +110,7 @@ def shot(context: SamplingContext, subject: str, poses: Sequence[int], box_of: B
     )
     poses_of_subject = context.pose_list.for_subject(subject)
     views = (
-        (i, context.view(poses_of_subject, pose), split(context, subject, pose))
+        (i, context.view(poses_of_subject, pose), _split(context, subject, pose))
         for i, pose in enumerate(poses, first // len(context.rig.sensors))
     )
     instants = [context.instant(subject, view, target, focus, part, i) for i, view, part in views]
@@ -177,12 +177,12 @@ def _scene(context: SamplingContext, subject: str, pose: str, run: Run) -> Scene
 
 
 SAMPLER = SamplerSpec(
-    subjects=subjects,
-    factors=factors,
+    subjects=_subjects,
+    factors=_factors,
     blocks=blocks,
-    most_objects=most_objects,
-    cast=cast,
-    split=split,
-    standing=standing,
-    shot=shot,
+    most_objects=_most_objects,
+    cast=_cast,
+    split=_split,
+    standing=_standing,
+    shot=_shot,
 )

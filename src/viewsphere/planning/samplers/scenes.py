@@ -40,7 +40,7 @@ IN_THE_AIR = 1e-3
 """Metres between the floor and models that do not stand on it."""
 
 
-def subjects(recipe: Recipe, specs: Sequence[ModelSpec]) -> tuple[str, ...]:
+def _subjects(recipe: Recipe, specs: Sequence[ModelSpec]) -> tuple[str, ...]:
     """The scenes' names."""
     if is_animated(recipe):
         raise RecipeError("scenes: expected models and a scene that stand still; found frames of a file: leave frames out")
@@ -51,14 +51,14 @@ def subjects(recipe: Recipe, specs: Sequence[ModelSpec]) -> tuple[str, ...]:
     return scene_names(recipe)
 
 
-def factors(context: SamplingContext) -> str:
+def _factors(context: SamplingContext) -> str:
     """Scenes, and the poses of each."""
     entry = scenes_entry(context.recipe)
     views = len(context.pose_list) if entry.views is None else min(entry.views, len(context.pose_list))
     return f"{quantity(len(context.subjects), 'scene')} of {quantity(context.models, 'model')} x {quantity(views, 'pose')}"
 
 
-def blocks(context: SamplingContext) -> tuple[Block, ...]:
+def _blocks(context: SamplingContext) -> tuple[Block, ...]:
     """Return the blocks of every scene, with all poses or the drawn ones. Raises RecipeError if too few models can share a
     scene.
     """
@@ -69,17 +69,17 @@ def blocks(context: SamplingContext) -> tuple[Block, ...]:
     return tuple(Block(tuple(names), poses) for poses, names in taken)
 
 
-def most_objects(recipe: Recipe) -> int:
+def _most_objects(recipe: Recipe) -> int:
     """Most models in a scene."""
     return scenes_entry(recipe).most_objects
 
 
-def cast(context: SamplingContext, subject: str, pose: int | None) -> tuple[ModelSpec, ...]:
+def _cast(context: SamplingContext, subject: str, pose: int | None) -> tuple[ModelSpec, ...]:
     """The models of a scene."""
     return scene_cast(context, subject)
 
 
-def split(context: SamplingContext, subject: str, pose: int) -> str:
+def _split(context: SamplingContext, subject: str, pose: int) -> str:
     """The scene's split, or one drawn from the pose, place or name; with splits by model, the split drawn before the scene's
     models.
     """
@@ -92,7 +92,7 @@ def split(context: SamplingContext, subject: str, pose: int) -> str:
             return context.hashed_split(subject, pose)
 
 
-def standing(context: SamplingContext, subject: str, box_of: BoxOf) -> Iterator[Standing]:
+def _standing(context: SamplingContext, subject: str, box_of: BoxOf) -> Iterator[Standing]:
     """The placed models of a scene; nothing if their place is drawn for each frame."""
     if not context.recipe.scene.is_moved_each_frame and not is_slow(scenes_entry(context.recipe).layout):
         things = scene_things(context, subject, None, box_of)
@@ -100,7 +100,7 @@ def standing(context: SamplingContext, subject: str, box_of: BoxOf) -> Iterator[
         yield Standing(things, center_of_all(things, box_of), views, poses)
 
 
-def shot(context: SamplingContext, subject: str, poses: Sequence[int], box_of: BoxOf, key: str, first: int) -> Shot:
+def _shot(context: SamplingContext, subject: str, poses: Sequence[int], box_of: BoxOf, key: str, first: int) -> Shot:
     """The shot of a scene's models and their surroundings; cameras look at the middle of the models."""
     pose = context.scene_pose(poses[0])
     targets = things = scene_things(context, subject, pose, box_of)
@@ -110,7 +110,7 @@ def shot(context: SamplingContext, subject: str, poses: Sequence[int], box_of: B
     things += scene_distractors(context, subject, pose, box_of) + scene_around(context, subject, pose, box_of)
     views = context.pose_list.for_subject(subject)
     instants = [
-        context.instant(subject, context.view(views, pose), middle, middle, split(context, subject, pose), i)
+        context.instant(subject, context.view(views, pose), middle, middle, _split(context, subject, pose), i)
         for i, pose in enumerate(poses, first // len(context.rig.sensors))
     ]
     scene = context.scene(subject, context.pose_list.name(poses[0]))
@@ -125,12 +125,12 @@ def _poses(context: SamplingContext, subject: str) -> Ranges:
 
 
 SAMPLER = SamplerSpec(
-    subjects=subjects,
-    factors=factors,
-    blocks=blocks,
-    most_objects=most_objects,
-    cast=cast,
-    split=split,
-    standing=standing,
-    shot=shot,
+    subjects=_subjects,
+    factors=_factors,
+    blocks=_blocks,
+    most_objects=_most_objects,
+    cast=_cast,
+    split=_split,
+    standing=_standing,
+    shot=_shot,
 )

@@ -74,14 +74,14 @@ def subjects(recipe: Recipe, specs: Sequence[ModelSpec]) -> tuple[str, ...]:
     return tuple(spec.key for spec in specs)
 
 
-def factors(context: SamplingContext) -> str:
+def _factors(context: SamplingContext) -> str:
     """The factors of the number of frames: models or scenes, sequences and instants."""
     subjects = quantity(len(context.subjects), "model" if context.recipe.scenes is None else "scene")
     views = sum(len(names) for names in _taken(context).values())
     return f"{subjects}, {quantity(views, 'sequence')} x {quantity(time_of(context).count, 'instant')}"
 
 
-def blocks(context: SamplingContext) -> tuple[Block, ...]:
+def _blocks(context: SamplingContext) -> tuple[Block, ...]:
     """Blocks of rows: for each viewpoint, its subjects and its instants."""
     if context.recipe.scenes is not None:
         check_scene_models(context)
@@ -89,21 +89,21 @@ def blocks(context: SamplingContext) -> tuple[Block, ...]:
     return tuple(Block(tuple(names), ((view * count, (view + 1) * count),)) for view, names in _taken(context).items())
 
 
-def most_objects(recipe: Recipe) -> int:
+def _most_objects(recipe: Recipe) -> int:
     """The number of models: one and its company, or the most models in a scene."""
     if recipe.scenes is not None:
         return scenes_entry(recipe).most_objects
     return 1 + (recipe.scene.company.number if recipe.scene.company else 0)
 
 
-def cast(context: SamplingContext, subject: str, pose: int | None) -> tuple[ModelSpec, ...]:
+def _cast(context: SamplingContext, subject: str, pose: int | None) -> tuple[ModelSpec, ...]:
     """The recipe's models in a sequence; without a pose, the model alone if company is drawn for each sequence."""
     if context.recipe.scenes is not None:
         return scene_cast(context, subject)
     return context.with_company(subject, pose)
 
 
-def split(context: SamplingContext, subject: str, pose: int) -> str:
+def _split(context: SamplingContext, subject: str, pose: int) -> str:
     """The split of the model, the scene or the sequence, or one drawn from the pose, place or name."""
     by = context.recipe.splits.by
     if by == "sequence":
@@ -113,7 +113,7 @@ def split(context: SamplingContext, subject: str, pose: int) -> str:
     return context.dealt_splits[subject] if by in ("model", "scene") else context.hashed_split(subject, pose)
 
 
-def standing(context: SamplingContext, subject: str, box_of: BoxOf) -> Iterator[Standing]:
+def _standing(context: SamplingContext, subject: str, box_of: BoxOf) -> Iterator[Standing]:
     """The things at their places, for still cameras; nothing if they are drawn for each sequence."""
     if not context.recipe.scene.is_moved_each_frame and is_still(context.recipe.viewpoints) and not _is_slow(context.recipe):
         things = placed_targets(context, subject, None, box_of)
@@ -129,7 +129,7 @@ def _is_slow(recipe: Recipe) -> bool:
     return layout is not None and is_slow(layout)
 
 
-def shot(context: SamplingContext, subject: str, poses: Sequence[int], box_of: BoxOf, key: str, first: int) -> Shot:
+def _shot(context: SamplingContext, subject: str, poses: Sequence[int], box_of: BoxOf, key: str, first: int) -> Shot:
     """The shot of some instants of a sequence, with the instants that their labels need."""
     start = poses[0] - poses[0] % time_of(context).count
     taken = {pose - start for pose in poses}
@@ -159,7 +159,7 @@ def _tracks(context: SamplingContext, subject: str, start: int) -> Tracks | None
 
 def _instant(context: SamplingContext, own: SequenceState, subject: str, pose: int, box_of: BoxOf) -> Instant:
     """The instant of a pose."""
-    time, part = time_of(context), split(context, subject, pose)
+    time, part = time_of(context), _split(context, subject, pose)
     i = pose % time.count
     if own.rig is None:
         view, at = context.sequences_of(subject)[pose], own.focus_at(i, context.recipe.viewpoints.target == "follow", box_of)
@@ -197,13 +197,13 @@ def _taken(context: SamplingContext) -> dict[int, list[str]]:
 
 SAMPLER = SamplerSpec(
     subjects=subjects,
-    factors=factors,
-    blocks=blocks,
-    most_objects=most_objects,
-    cast=cast,
-    split=split,
-    standing=standing,
-    shot=shot,
+    factors=_factors,
+    blocks=_blocks,
+    most_objects=_most_objects,
+    cast=_cast,
+    split=_split,
+    standing=_standing,
+    shot=_shot,
 )
 
 

@@ -41,7 +41,7 @@ def in_reach(low: float, high: float) -> None:
         raise ValueError(f"expected distances of at most {FARTHEST:,.0f} m; found {high:g}")
 
 
-def in_picture(low: float, high: float) -> None:
+def _in_picture(low: float, high: float) -> None:
     """Raise ValueError for filled shares of a picture that are not positive or too large."""
     if low <= 0 or high > FULLEST:
         raise ValueError(f"expected a share above 0 and up to {FULLEST:g}; found {low if low <= 0 else high:g}")
@@ -55,7 +55,7 @@ class Fill(Frozen):
     @field_validator("fill")
     @classmethod
     def _fill(cls, value: float | tuple[float, ...] | Range) -> float | tuple[float, ...] | Range:
-        in_picture(*ends_of(value))
+        _in_picture(*ends_of(value))
         return value
 
 
@@ -67,7 +67,7 @@ class FillBetween(Frozen):
     @field_validator("fill")
     @classmethod
     def _fill(cls, value: tuple[float, float]) -> tuple[float, float]:
-        in_picture(*value)
+        _in_picture(*value)
         return value
 
 

@@ -18,9 +18,9 @@ class AreaEntry(entry_of(AreaLight), Aimed):
     kind: Literal["area"] = Field(description="a rectangle that shines to one side")
 
 
-def emitters(lamp: AreaEntry) -> tuple[AreaLight]:
+def _emitters(lamp: AreaEntry) -> tuple[AreaLight]:
     """The lamp itself."""
     return (emitter(lamp),)
 
 
-LIGHT = LightSpec(options=AreaEntry, emitters=emitters)
+LIGHT = LightSpec(options=AreaEntry, emitters=_emitters)

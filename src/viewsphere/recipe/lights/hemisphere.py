@@ -18,9 +18,9 @@ class HemisphereEntry(entry_of(HemisphereLight), Lamp):
     kind: Literal["hemisphere"] = Field(description="even light from above, and another from below")
 
 
-def emitters(lamp: HemisphereEntry) -> tuple[HemisphereLight]:
+def _emitters(lamp: HemisphereEntry) -> tuple[HemisphereLight]:
     """The lamp itself."""
     return (emitter(lamp),)
 
 
-LIGHT = LightSpec(options=HemisphereEntry, emitters=emitters, is_sky=True)
+LIGHT = LightSpec(options=HemisphereEntry, emitters=_emitters, is_sky=True)

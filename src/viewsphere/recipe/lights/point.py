@@ -12,9 +12,9 @@ class PointEntry(entry_of(PointLight, fixed=("kind",)), Placed):
     """Small balls that shine everywhere."""
 
 
-def emitters(lamp: PointEntry) -> tuple[PointLight]:
+def _emitters(lamp: PointEntry) -> tuple[PointLight]:
     """The lamp itself."""
     return (emitter(lamp),)
 
 
-LIGHT = LightSpec(options=PointEntry, emitters=emitters)
+LIGHT = LightSpec(options=PointEntry, emitters=_emitters)

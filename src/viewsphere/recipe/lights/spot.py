@@ -18,9 +18,9 @@ class SpotEntry(entry_of(SpotLight), Aimed):
     kind: Literal["spot"] = Field(description="a cone of light")
 
 
-def emitters(lamp: SpotEntry) -> tuple[SpotLight]:
+def _emitters(lamp: SpotEntry) -> tuple[SpotLight]:
     """The lamp itself."""
     return (emitter(lamp),)
 
 
-LIGHT = LightSpec(options=SpotEntry, emitters=emitters)
+LIGHT = LightSpec(options=SpotEntry, emitters=_emitters)

@@ -21,19 +21,19 @@ def edge_highlight(picture: Float32, strength: float, seen: Seen) -> Float32:
     """The picture with lines that are blended towards white by `strength`; alpha is unchanged."""
     if strength == 0:
         return picture
-    share = lines(seen)[..., None] * np.float32(strength)
+    share = _lines(seen)[..., None] * np.float32(strength)
     white = picture[..., 3:] if picture.shape[2] == 4 else np.float32(1)
     out = picture.copy()
     out[..., :3] += (white - picture[..., :3]) * share
     return out
 
 
-def lines(seen: Seen) -> Float32:
+def _lines(seen: Seen) -> Float32:
     """Return the coverage by lines of each pixel, (H, W) float32 in [0, 1].
 
     The inverse depth of a plane is linear in the picture, so its second difference is not 0 only at creases and steps.
     """
-    bent = crease(seen.inverse_depth, seen.intrinsics.fx)
+    bent = _crease(seen.inverse_depth, seen.intrinsics.fx)
     low, high = CREASE
     edge = np.where(seen.targets, np.clip((bent - low) / (high - low), 0, 1), np.float32(0))
     edge[seen.targets & _beside(~seen.targets)] = 1
@@ -42,7 +42,7 @@ def lines(seen: Seen) -> Float32:
     return np.minimum(soft * np.float32(sigma * 2.5 + 0.6), 1)
 
 
-def crease(inverse_depth: Float32, focal: float) -> Float32:
+def _crease(inverse_depth: Float32, focal: float) -> Float32:
     """Change of the surface's slope from one pixel to the next, approximately the tangent of the angle; (H, W), 0 where
     empty.
     """

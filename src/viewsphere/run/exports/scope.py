@@ -56,14 +56,14 @@ def scope_of(dataset: Dataset) -> Scope:
         known = replace(known, channels=tuple(dict.fromkeys((*known.channels, *label_names()))), annotations=label_names())
     if shots and shots[0] and all(shots):
         return replace(known, rig=shots[0].rig)
-    pictures = tuple(chain.from_iterable(map(telling, dataset.samples_of_parts)))
+    pictures = tuple(chain.from_iterable(map(_telling, dataset.samples_of_parts)))
     asked = dict.fromkeys(name for sample in pictures for name in sample.requested)
     return replace(known, annotations=tuple(dict.fromkeys((*known.annotations, *asked))), pictures=pictures)
 
 
 def scope_of_foreign(foreign: ForeignDataset) -> Scope:
     """Return the known facts about a data set before its import."""
-    pictures = telling(frame.sample for frame in foreign.frames())
+    pictures = _telling(frame.sample for frame in foreign.frames())
     return Scope(
         categories=foreign.categories,
         splits=foreign.splits,
@@ -76,7 +76,7 @@ def scope_of_foreign(foreign: ForeignDataset) -> Scope:
     )
 
 
-def telling(samples: Iterable[Sample]) -> tuple[Sample, ...]:
+def _telling(samples: Iterable[Sample]) -> tuple[Sample, ...]:
     """The first sample, and the first sample for each other combination of known facts: a camera, a viewpoint, an object's
     position. At most LOOKED_AT samples are examined.
     """

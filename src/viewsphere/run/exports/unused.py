@@ -47,7 +47,7 @@ class Unused:
 def unused(store: Store, formats: Iterable[FormatEntry]) -> Unused | None:
     """The channels of finished shots that none of these formats uses; None if they take little space, or without formats."""
     entries = tuple(formats)
-    return among(channel_bytes(store), entries) if entries else None
+    return among(_channel_bytes(store), entries) if entries else None
 
 
 def among(sizes: Counter[str], formats: Sequence[FormatEntry]) -> Unused | None:
@@ -58,7 +58,7 @@ def among(sizes: Counter[str], formats: Sequence[FormatEntry]) -> Unused | None:
     return Unused(tuple(left), share, tuple(dict.fromkeys(entry.name for entry in formats))) if share >= LARGE else None
 
 
-def channel_bytes(store: Store) -> Counter[str]:
+def _channel_bytes(store: Store) -> Counter[str]:
     """Bytes of each channel in some of the finished shots, from their manifests, without damaged shots."""
     sizes: Counter[str] = Counter()
     for key in islice(store.finished(), MOST_SHOTS):

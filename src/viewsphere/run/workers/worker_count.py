@@ -33,10 +33,10 @@ def cores() -> int:
 
 def default_workers(work: Missing) -> int:
     """One worker per core; 0, so that this process renders, if one shot or less than SHORT_S of work is left."""
-    return 0 if is_short(work) else cores()
+    return 0 if _is_short(work) else cores()
 
 
-def is_short(work: Missing) -> bool:
+def _is_short(work: Missing) -> bool:
     """True if one shot or less than SHORT_S of work is left, counting the models to be made."""
     shots = sum(count for _, count in work.lines())
     seconds, models = _frame_seconds(work, shots), 0

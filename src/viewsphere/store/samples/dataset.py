@@ -76,7 +76,7 @@ class Dataset(Shown, Sequence[Sample]):
         self.store = Store(self.root)
         self.plan = self.store.plan()
         self.link_kinds: set[str] = set()
-        self.made = Made()
+        self.made = _Made()
         self._records = lru_cache(maxsize=8)(self._read_records)
         self._manifests = lru_cache(maxsize=8)(partial(_manifest_of, self.root))
         self._info = lru_cache(maxsize=10_000)(self.store.model_info)
@@ -751,7 +751,7 @@ def _damaged(file: Path, error: Exception) -> StoreError:
     )
 
 
-class Made:
+class _Made:
     """The files made for the currently exported frame, by the names of their encodings."""
 
     def __init__(self) -> None:

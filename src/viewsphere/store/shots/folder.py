@@ -270,7 +270,7 @@ class Store:
         """Return the path of a sample's channel in a finished shot, with the file type from `kinds`, relative to the data set's
         root.
         """
-        return f"{self.shot_folder(key).relative_to(self.root).as_posix()}/{channel_path(channel, sample, kinds)}"
+        return f"{self.shot_folder(key).relative_to(self.root).as_posix()}/{_channel_path(channel, sample, kinds)}"
 
     def channel_files(self, key: str, shot: Shot) -> tuple[tuple[str, str, str], ...]:
         """Return the file names of a finished shot's channels.
@@ -371,7 +371,7 @@ class Store:
             for sample in samples:
                 files: dict[str, str] = {}
                 for name, array in sample.channels.items():
-                    inside = channel_path(name, sample.index, kinds)
+                    inside = _channel_path(name, sample.index, kinds)
                     put.add(inside, encode(table[name], array, kinds))
                     files[name] = f"{prefix}/{inside}"
                 short = channels_of_sensor.get(sample.sensor) == tuple(files) and shot is not None and shot.files == kinds
@@ -456,7 +456,7 @@ def new_folder(target: Path) -> AbstractContextManager[Path]:
     return place_of(target).new()
 
 
-def channel_path(channel: str, sample: int, kinds: Files | None = None) -> str:
+def _channel_path(channel: str, sample: int, kinds: Files | None = None) -> str:
     """Return the path in its shot's folder of a sample's channel (by its number in the data set), with the file type from
     `kinds`.
     """

@@ -50,7 +50,7 @@ NO_CUTOUTS = AlphaMasks(
 )
 
 
-def mesh_cutouts(mesh: Mesh, label_alpha: float | None) -> tuple[AlphaMasks, NDArray[np.int32]]:
+def _mesh_cutouts(mesh: Mesh, label_alpha: float | None) -> tuple[AlphaMasks, NDArray[np.int32]]:
     """The mesh's cut-outs and, for each triangle (T,), SURFACE, NEVER or its row of `corners`.
 
     Without `label_alpha`, a BLEND material is surface wherever it has a colour, plus one texel beyond, which filtering colours.
@@ -76,8 +76,8 @@ def mesh_cutouts(mesh: Mesh, label_alpha: float | None) -> tuple[AlphaMasks, NDA
 
 
 def alpha_masks_of(meshes: Sequence[Mesh], label_alpha: float | None) -> list[tuple[AlphaMasks, NDArray[np.int32]]]:
-    """`mesh_cutouts` of each mesh; a mesh shared by several things is processed once."""
-    known = {id(mesh): mesh_cutouts(mesh, label_alpha) for mesh in {id(mesh): mesh for mesh in meshes}.values()}
+    """`_mesh_cutouts` of each mesh; a mesh shared by several things is processed once."""
+    known = {id(mesh): _mesh_cutouts(mesh, label_alpha) for mesh in {id(mesh): mesh for mesh in meshes}.values()}
     return [known[id(mesh)] for mesh in meshes]
 
 

@@ -163,7 +163,7 @@ def homogeneous(geometry: Geometry, camera: Camera, base: int = 0, stop: int | N
     m = k[:, :1] * moved[0] + k[:, 1:2] * moved[1] + k[:, 2:] * moved[2]
     if base or stop is not None or not camera.lens.is_linear:
         return projected(geometry, m, base, stop)
-    end, without = len(geometry.coordinates), outside(geometry, camera, m)
+    end, without = len(geometry.coordinates), _outside(geometry, camera, m)
     q = geometry.spare.array((end, 4), np.float64)
     starts = zip(geometry.vertex_start, without.tolist(), strict=False)
     q[[start for start, is_left_out in starts if is_left_out and start < end]] = OUTSIDE
@@ -227,7 +227,7 @@ def _project(geometry: Geometry, m: NDArray[np.float64], base: int, stop: int, q
         kernels_draw.transform(geometry.ground, low, high, m, q[first - base :])
 
 
-def outside(geometry: Geometry, camera: Camera, pixels_from_world: NDArray[np.float64]) -> NDArray[np.bool_]:
+def _outside(geometry: Geometry, camera: Camera, pixels_from_world: NDArray[np.float64]) -> NDArray[np.bool_]:
     """Return a mask of the things that are wholly outside a pinhole's picture, by at least a pixel, or behind the camera.
 
     For such a thing, all corners of its box are beyond the same side.

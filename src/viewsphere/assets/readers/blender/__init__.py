@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 USD = ("usd", "usda", "usdc", "usdz")
 
 
-def read(folder: ModelFolder) -> tuple[Mesh, FileFacts]:
+def _read(folder: ModelFolder) -> tuple[Mesh, FileFacts]:
     """The model, see `reading.read_via_blender`."""
     if folder.model.suffix[1:].lower() in USD:
         folder.warn("Blender may lose the transform above a mesh that is below a mesh; pip install 'viewsphere[usd]'")
@@ -42,5 +42,5 @@ READER = ReaderSpec(
     reserves_memory=True,
     first_bytes={b"Kaydara FBX": ("fbx",), b"BLENDER": ("blend",), b"Ogawa": ("abc",)},
     archives={"blend": "gzip", "usd": "ZIP", "usdz": "ZIP"},
-    read=read,
+    read=_read,
 )

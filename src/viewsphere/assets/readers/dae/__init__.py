@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from viewsphere.assets.primitive import FileFacts
 
 
-def read(folder: ModelFolder) -> tuple[Mesh, FileFacts]:
+def _read(folder: ModelFolder) -> tuple[Mesh, FileFacts]:
     """The model, see `reading.read_dae`."""
     from viewsphere.assets.readers.dae.reading import read_dae
 
@@ -22,6 +22,6 @@ def read(folder: ModelFolder) -> tuple[Mesh, FileFacts]:
 READER = ReaderSpec(
     about="DAE (COLLADA)",
     suffixes=("dae",),
-    read=read,
+    read=_read,
     modules=("viewsphere.assets.readers.dae.reading",),
 )

@@ -67,7 +67,7 @@ class _Input:
 def _inputs(folder: ModelFolder, element: Any, sources: dict[str, Any], shared: dict[str, list[Any]]) -> list[_Input]:
     inputs: list[_Input] = []
     for entry in element.iterfind("input"):
-        offset, name = whole(folder, entry, "offset"), _target(entry)
+        offset, name = _whole(folder, entry, "offset"), _target(entry)
         below = shared.get(name) if entry.get("semantic") == "VERTEX" else None
         for inner in [entry] if below is None else below:
             source = sources.get(_target(inner))
@@ -75,13 +75,13 @@ def _inputs(folder: ModelFolder, element: Any, sources: dict[str, Any], shared: 
                 raise folder.error(f"the source {_target(inner)[:80]!r} of a mesh does not exist; export the model again")
             semantic = str(inner.get("semantic"))
             before = sum(one.semantic == semantic for one in inputs)
-            number = whole(folder, inner, "set", whole(folder, entry, "set", before))
+            number = _whole(folder, inner, "set", _whole(folder, entry, "set", before))
             kind = "POSITION" if semantic == "VERTEX" else semantic
             inputs.append(_Input(kind, number, offset, _values(folder, source), str(source.get("id"))[:80]))
     return inputs
 
 
-def whole(folder: ModelFolder, element: Any, attribute: str, default: int = 0) -> int:
+def _whole(folder: ModelFolder, element: Any, attribute: str, default: int = 0) -> int:
     """A whole number of at least 0 in an attribute; `default` if it is missing or empty."""
     text = str(element.get(attribute) or default).strip()
     if not (text.isascii() and text.isdecimal() and len(text) < 12):
@@ -98,14 +98,14 @@ def _values(folder: ModelFolder, source: Any) -> Float:
     array, accessor = source.find("float_array"), source.find("technique_common/accessor")
     numbers = numbers_of(folder, array, np.float64)
     params = [] if accessor is None else accessor.findall("param")
-    stride = 3 if accessor is None else whole(folder, accessor, "stride", 1)
-    offset = 0 if accessor is None else whole(folder, accessor, "offset")
+    stride = 3 if accessor is None else _whole(folder, accessor, "stride", 1)
+    offset = 0 if accessor is None else _whole(folder, accessor, "offset")
     # A column without a name is skipped, unless a program omits all names.
     named = [i for i, param in enumerate(params) if param.get("name")] or list(range(len(params) or stride))
     if not 1 <= stride <= WIDEST or max(named) >= stride:
         raise folder.error(f"the source {str(source.get('id'))[:80]!r} has an accessor that is damaged; export the model again")
     rows = (len(numbers) - offset) // stride
-    count = rows if accessor is None else min(whole(folder, accessor, "count", rows), rows)
+    count = rows if accessor is None else min(_whole(folder, accessor, "count", rows), rows)
     return numbers[offset : offset + max(count, 0) * stride].reshape(-1, stride)[:, named]
 
 
@@ -135,7 +135,7 @@ def _faces(folder: ModelFolder, element: Any, inputs: Sequence[_Input]) -> DaeFa
     position = next((one for one in inputs if one.semantic == "POSITION" and one.values.shape[1] == 3), None)
     if position is None:
         raise folder.error(f"a <{element.tag}> has no positions of three coordinates; export the model again")
-    width = 1 + max(whole(folder, entry, "offset") for entry in element.iterfind("input"))
+    width = 1 + max(_whole(folder, entry, "offset") for entry in element.iterfind("input"))
     if width > WIDEST:
         raise folder.error(f"a <{element.tag}> has an input of offset {width - 1:,}; the file may be damaged")
     index, counts = _corners(folder, element, width, position)

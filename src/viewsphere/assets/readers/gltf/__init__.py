@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from viewsphere.assets.primitive import FileFacts
 
 
-def read(folder: ModelFolder) -> tuple[Mesh, FileFacts]:
+def _read(folder: ModelFolder) -> tuple[Mesh, FileFacts]:
     """The model, see `reading.read_gltf`."""
     from viewsphere.assets.readers.gltf.reading import read_gltf
 
@@ -43,6 +43,6 @@ READER = ReaderSpec(
     frames=frames,
     timeline=timeline,
     first_bytes={b"glTF": ("glb", "gltf")},
-    read=read,
+    read=_read,
     modules=("viewsphere.assets.readers.gltf.reading",),
 )

@@ -34,7 +34,7 @@ LEAST, MOST = 1.0, 1000.0
 """Frames per second that an animation may have; other rates are ignored."""
 
 
-def rate_of(document: Document) -> float:
+def _rate_of(document: Document) -> float:
     """The likeliest rate with a frame at every key of the file. If none fits, the rate of the closest keys if it fits all keys,
     else 24.
     """
@@ -46,11 +46,11 @@ def rate_of(document: Document) -> float:
 
 def timeline(document: Document, clip: str | None, fps: float | None) -> dict[str, Any]:
     """First and last frame of `clip` (None: each node's first animation), frame rate, whether anything moves, and the `clips`
-    with their first and last frames, as plain data. Without `fps`, the rate is `rate_of` the file.
+    with their first and last frames, as plain data. Without `fps`, the rate is that of the file.
 
     Raises ModelError for a clip that the file does not have.
     """
-    rate = rate_of(document) if fps is None else fps
+    rate = _rate_of(document) if fps is None else fps
     clips = {name: _span([_times(document, one)], rate) for name, one in sorted(_animations(document).items())}
     played = {id(one): _times(document, one) for one, _, _ in _channels(document, clip)}
     first, last = _span([*played.values()], rate)

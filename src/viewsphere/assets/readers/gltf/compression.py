@@ -62,7 +62,7 @@ def unpacked_view(folder: ModelFolder, extension: str, fields: Field, slice_of: 
     except MemoryError:
         raise
     except Exception as error:  # the package's own kinds of errors, too
-        raise damaged(folder, fields, extension, error) from None
+        raise _damaged(folder, fields, extension, error) from None
     if mode == "ATTRIBUTES":
         return decoded.tobytes()
     return decoded.astype("<u2" if stride == 2 else "<u4").tobytes()
@@ -77,7 +77,7 @@ def unpacked_primitive(folder: ModelFolder, primitive: Field, fields: Field, dat
     except MemoryError:
         raise
     except Exception as error:  # the package's own kinds of errors, too
-        raise damaged(folder, fields, DRACO, error) from None
+        raise _damaged(folder, fields, DRACO, error) from None
     attributes = primitive.get("attributes")
     elements: dict[int, NDArray[Any]] = {}
     for name in fields.get("attributes").mapping():
@@ -91,7 +91,7 @@ def unpacked_primitive(folder: ModelFolder, primitive: Field, fields: Field, dat
     return elements
 
 
-def damaged(folder: ModelFolder, fields: Field, extension: str, error: Exception) -> ModelError:
+def _damaged(folder: ModelFolder, fields: Field, extension: str, error: Exception) -> ModelError:
     """The error for compressed data that its package cannot decode."""
     reason = " ".join(str(error).split())[:100]
     return folder.error(f"{fields.where.rpartition('.')[0]}: {extension} cannot be decoded ({reason}): truncated or damaged")

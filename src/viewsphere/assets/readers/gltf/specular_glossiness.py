@@ -56,7 +56,7 @@ def as_metallic_roughness(folder: ModelFolder, material: Material, look: Specula
     return _of_texels(folder, material, look)
 
 
-def converted(diffuse: Float, specular: Float) -> tuple[Float, Float]:
+def _converted(diffuse: Float, specular: Float) -> tuple[Float, Float]:
     """Base colours (N, 3) and metallic factors (N,) of diffuse and specular colours (N, 3), all linear."""
     strength = 1.0 - specular.max(axis=-1)
     metallic = _metallic(_brightness(diffuse), _brightness(specular), strength)[:, None]
@@ -90,7 +90,7 @@ def _with_mean(folder: ModelFolder, look: SpecularGlossiness) -> SpecularGlossin
 
 
 def _of_factors(material: Material, look: SpecularGlossiness) -> Material:
-    base, metallic = converted(np.array([look.diffuse]), np.array([look.specular]))
+    base, metallic = _converted(np.array([look.diffuse]), np.array([look.specular]))
     red, green, blue = base[0].tolist()
     return replace(
         material,
@@ -136,7 +136,7 @@ def _texels(folder: ModelFolder, look: SpecularGlossiness) -> tuple[Bytes, Bytes
         count = len(base[band])
         of_diffuse = _colors(None if diffuse is None else diffuse[band], look.diffuse, count)
         of_specular = _colors(None if specular is None else specular[band], look.specular, count)
-        colors, metallic = converted(of_diffuse, of_specular)
+        colors, metallic = _converted(of_diffuse, of_specular)
         base[band, :3] = srgb_bytes(colors)
         if diffuse is not None:
             base[band, 3] = diffuse[band, 3]

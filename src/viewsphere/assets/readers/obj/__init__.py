@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from viewsphere.assets.primitive import FileFacts
 
 
-def read(folder: ModelFolder) -> tuple[Mesh, FileFacts]:
+def _read(folder: ModelFolder) -> tuple[Mesh, FileFacts]:
     """The model, see `reading.read_obj`."""
     from viewsphere.assets.readers.obj.reading import read_obj
 
@@ -25,6 +25,6 @@ READER = ReaderSpec(
     axes=("+y", "+z"),
     assumes_up=True,
     unit="1 m",
-    read=read,
+    read=_read,
     modules=("viewsphere.assets.readers.obj.reading",),
 )

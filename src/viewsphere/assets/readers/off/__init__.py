@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from viewsphere.assets.primitive import FileFacts
 
 
-def read(folder: ModelFolder) -> tuple[Mesh, FileFacts]:
+def _read(folder: ModelFolder) -> tuple[Mesh, FileFacts]:
     """The model, see `reading.read_off`."""
     from viewsphere.assets.readers.off.reading import read_off
 
@@ -25,6 +25,6 @@ READER = ReaderSpec(
     axes=("+z", "-y"),
     assumes_up=True,
     unit="1 m",
-    read=read,
+    read=_read,
     modules=("viewsphere.assets.readers.off.reading",),
 )

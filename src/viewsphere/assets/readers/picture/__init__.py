@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from viewsphere.assets.primitive import FileFacts
 
 
-def read(folder: ModelFolder) -> tuple[Mesh, FileFacts]:
+def _read(folder: ModelFolder) -> tuple[Mesh, FileFacts]:
     """The model, see `reading.read_picture`."""
     from viewsphere.assets.readers.picture.reading import read_picture
 
@@ -25,6 +25,6 @@ READER = ReaderSpec(
     axes=("+z", "-y"),
     unit="1 m",
     is_picture=True,
-    read=read,
+    read=_read,
     modules=("viewsphere.assets.readers.picture.reading",),
 )

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from viewsphere.assets.primitive import FileFacts
 
 
-def read(folder: ModelFolder) -> tuple[Mesh, FileFacts]:
+def _read(folder: ModelFolder) -> tuple[Mesh, FileFacts]:
     """The model, see `reading.read_ply`."""
     from viewsphere.assets.readers.ply.reading import read_ply
 
@@ -26,6 +26,6 @@ READER = ReaderSpec(
     assumes_up=True,
     unit="1 m",
     first_bytes={b"ply\n": ("ply",), b"ply\r": ("ply",)},
-    read=read,
+    read=_read,
     modules=("viewsphere.assets.readers.ply.reading",),
 )

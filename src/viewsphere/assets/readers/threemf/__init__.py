@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from viewsphere.assets.primitive import FileFacts
 
 
-def read(folder: ModelFolder) -> tuple[Mesh, FileFacts]:
+def _read(folder: ModelFolder) -> tuple[Mesh, FileFacts]:
     """The model, see `reading.read_3mf`."""
     from viewsphere.assets.readers.threemf.reading import read_3mf
 
@@ -25,6 +25,6 @@ READER = ReaderSpec(
     axes=("+z", "-y"),
     unit="from the file, else mm",
     archives={"3mf": "ZIP"},
-    read=read,
+    read=_read,
     modules=("viewsphere.assets.readers.threemf.reading",),
 )

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from viewsphere.assets.primitive import FileFacts
 
 
-def read(folder: ModelFolder) -> tuple[Mesh, FileFacts]:
+def _read(folder: ModelFolder) -> tuple[Mesh, FileFacts]:
     """The model, see `scene.read_usd`."""
     from viewsphere.assets.readers.usd.scene import read_usd
 
@@ -35,5 +35,5 @@ READER = ReaderSpec(
     reserves_memory=True,
     first_bytes={b"PXR-USDC": ("usdc", "usd"), b"#usda": ("usda", "usd")},
     archives={"usd": "ZIP", "usdz": "ZIP"},
-    read=read,
+    read=_read,
 )

@@ -54,7 +54,7 @@ class Producer:
         """The primvar that a reader of one of these kinds names, None for other nodes."""
         if not self.is_output or self.shader.GetIdAttr().Get() not in kinds:
             return None
-        name = constant(self.shader, "varname", time)
+        name = _constant(self.shader, "varname", time)
         return None if not name else str(name)
 
 
@@ -64,7 +64,7 @@ def producer(entry: Any) -> Producer | None:
     return Producer(attributes[0]) if attributes else None
 
 
-def constant(shader: Any, name: str, time: Any) -> Any:
+def _constant(shader: Any, name: str, time: Any) -> Any:
     """The constant value of a shader's input, or None."""
     source = producer(shader.GetInput(name))
     return None if source is None or source.is_output else source.value(time)
@@ -101,14 +101,14 @@ def network_texture(folder: ModelFolder, source: Producer | None, time: Any, wha
     if index is None:
         return None
     primvar, placement = _placement(shader, time)
-    wraps = (WRAPS.get(str(constant(shader, name, time)), "repeat") for name in ("wrapS", "wrapT"))
+    wraps = (WRAPS.get(str(_constant(shader, name, time)), "repeat") for name in ("wrapS", "wrapT"))
     wrap_s, wrap_t = wraps
-    scale, bias = (constant(shader, name, time) for name in ("scale", "bias"))
+    scale, bias = (_constant(shader, name, time) for name in ("scale", "bias"))
     return Sampled(
         replace(placement, image=index, wrap_s=wrap_s, wrap_t=wrap_t),
         primvar,
         channels,
-        _is_srgb(str(constant(shader, "sourceColorSpace", time) or "auto"), channels, folder, index),
+        _is_srgb(str(_constant(shader, "sourceColorSpace", time) or "auto"), channels, folder, index),
         NO_SCALE if scale is None else tuple(float(v) for v in scale),
         NO_BIAS if bias is None else tuple(float(v) for v in bias),
     )
@@ -129,9 +129,9 @@ def _placement(shader: Any, time: Any) -> tuple[str, Texture]:
     turn, scale, shift = 0.0, (1.0, 1.0), (0.0, 0.0)
     if source is not None and source.is_output and source.shader.GetIdAttr().Get() == "UsdTransform2d":
         node = source.shader
-        turn = math.radians(float(constant(node, "rotation", time) or 0.0))
-        scale = _pair(constant(node, "scale", time), scale)
-        shift = _pair(constant(node, "translation", time), shift)
+        turn = math.radians(float(_constant(node, "rotation", time) or 0.0))
+        scale = _pair(_constant(node, "scale", time), scale)
+        shift = _pair(_constant(node, "translation", time), shift)
         source = producer(node.GetInput("in"))
     primvar = None if source is None else source.primvar(time, ("UsdPrimvarReader_float2",))
     sine, cosine = scale[1] * math.sin(turn), scale[1] * math.cos(turn)

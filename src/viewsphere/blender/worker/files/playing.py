@@ -38,10 +38,10 @@ def play(clip):
 
 def clips():
     """Names of the animations."""
-    return list(clip_spans())
+    return list(_clip_spans())
 
 
-def clip_spans():
+def _clip_spans():
     """First and last frame of each animation, by its name."""
     found = {}
     for action in bpy.data.actions:
@@ -75,7 +75,7 @@ def timeline(scene):
         "last": scene.frame_end,
         "fps": scene.render.fps / scene.render.fps_base,
         "moves": scene.frame_end > scene.frame_start and _moves(scene),
-        "clips": [{"name": name, "first": first, "last": last} for name, (first, last) in clip_spans().items()],
+        "clips": [{"name": name, "first": first, "last": last} for name, (first, last) in _clip_spans().items()],
     }
 
 
@@ -90,13 +90,13 @@ def curves(action, slot=None):
 
 def go_to(scene, frame, after=None):
     """Go to a frame. Simulations are played up to it, from the first frame or from the last shown frame, `after`."""
-    if is_simulated(scene):
+    if _is_simulated(scene):
         for between in range(scene.frame_start if after is None else after + 1, frame):
             scene.frame_set(between)
     scene.frame_set(frame)
 
 
-def is_simulated(scene):
+def _is_simulated(scene):
     """Return whether the scene has simulations, so that a frame depends on earlier ones."""
     world = scene.rigidbody_world
     return bool(
@@ -111,7 +111,7 @@ def _moves(scene):
     return bool(
         len(bpy.data.actions)
         or len(bpy.data.cache_files)
-        or is_simulated(scene)
+        or _is_simulated(scene)
         or any(modifier.type in PLAYED for modifier in _modifiers(scene))
         or _has_node(TIME_NODES)
         or any(data.animation_data and data.animation_data.drivers for data in _animated())

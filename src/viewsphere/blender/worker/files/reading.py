@@ -53,8 +53,8 @@ def read(told):
     go_to(scene, frame, told.get("after"))
     pictures = Pictures(told["folder"], told["root"])
     gathering = Gathering(told["folder"], pictures, wanted, told["most"])
-    points = Points(wanted)
-    marks = Marks(wanted)
+    points = _Points(wanted)
+    marks = _Marks(wanted)
     evaluate(scene, gathering, points, marks)
     return {
         "frame": frame,
@@ -125,7 +125,7 @@ def prepare(scene):
     scene.collection.objects.link(scene.camera)
 
 
-class Marks:
+class _Marks:
     """Collects the objects that have the property or a lane's name. `found` lists them in the order of their names."""
 
     def __init__(self, wanted):
@@ -175,7 +175,7 @@ def _plain(value):
     return value if isinstance(value, (bool, int, float, str)) else str(value)
 
 
-class Points:
+class _Points:
     """Collects the points of rendered objects: `found` has the name, the position and the parent's number of each point."""
 
     def __init__(self, wanted):

@@ -9,7 +9,7 @@ def check_weight(scene, wanted, most):
     for item in scene.objects:
         if item.hide_render or item.type != "MESH" or (wanted is not None and item.as_pointer() not in wanted):
             continue
-        count, cause = expected_triangles(item, scene.render)
+        count, cause = _expected_triangles(item, scene.render)
         total += count
         if count > most:
             raise ValueError(
@@ -20,7 +20,7 @@ def check_weight(scene, wanted, most):
         raise ValueError(f"expected at most {most:,} triangles, found about {total:,} by modifiers; lower their levels")
 
 
-def expected_triangles(item, render):
+def _expected_triangles(item, render):
     """The expected triangles of an object, and the modifier that makes the most of them; unknown modifiers count as none."""
     faces, loops = len(item.data.polygons), len(item.data.loops)
     cause, most = "", 1.0

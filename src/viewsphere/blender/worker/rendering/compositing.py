@@ -6,7 +6,7 @@ import bpy
 import numpy as np
 
 
-def tree_of(scene):
+def _tree_of(scene):
     """The nodes of a scene's compositor, or None."""
     if not scene.render.use_compositing:
         return None
@@ -20,7 +20,7 @@ HOW = "pictures are those that the renderer gives; link Render Layers to its out
 
 def fault(scene):
     """The warnings if the compositor produces no picture, so that the uncomposited one is used; else an empty list."""
-    tree = tree_of(scene)
+    tree = _tree_of(scene)
     if tree is None or not len(tree.nodes) or is_used(scene):
         return []
     lacks = "render layers (or has muted ones)" if _has_output(tree) else "output that something leads to"
@@ -29,7 +29,7 @@ def fault(scene):
 
 def is_used(scene):
     """Return whether a compositor produces the picture; Blender renders nothing for a compositor without render layers."""
-    tree = tree_of(scene)
+    tree = _tree_of(scene)
     return tree is not None and _has_output(tree) and _asks_for_layers(tree)
 
 

@@ -49,13 +49,13 @@ def aimed(centers: Float, ahead: Float, focus: Sequence[Float] | None, world: Wo
             raise RecipeError(
                 f"viewpoints.look: expected another place than the camera's own; found ({place}) at instant {instant}"
             )
-        axes = facing(toward / length)
+        axes = _facing(toward / length)
         point = on_axis(center, axes[:, 2], world) if focus is None else focus[instant]
         poses.append(posed(axes, center, point))
     return tuple(poses)
 
 
-def facing(forward: Float) -> Float:
+def _facing(forward: Float) -> Float:
     """Axes (3, 3), in columns, of a level camera that looks along a unit vector; straight up or down, it is oriented as at
     azimuth 0.
     """

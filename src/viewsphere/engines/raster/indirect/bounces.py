@@ -229,7 +229,7 @@ def _baked(lighting: _Lighting) -> Bounces:
     scene = bounce_scene.which, bounce_scene.surfaces, bounce_scene.textures, bounce_scene.floor
     lit = patches.lit(*scene, surrounding.albedo, seen.tree, lighting.lights, off)
     directions = seen.volumes[0].rays.directions
-    sky, weights = sky_along(surrounding, directions), irradiance_weights(directions)
+    sky, weights = sky_along(surrounding, directions), _irradiance_weights(directions)
     emissive = emissive_triangles_of(bounce_scene.which, bounce_scene.surfaces, patches, lit.emitted, TURNS)
     shining, near = _shining(seen, emissive, lit.emitted, weights, off)
     own = lit.emitted * (emissive.froms == 0)[:, None] + lit.reflectance * lit.arrived / np.float32(math.pi)
@@ -412,7 +412,7 @@ def _map(bounce_scene: BounceScene, z: float) -> tuple[Float32, Float32]:
     return places.astype(np.float32), np.array([cells, left, front, 1], np.float32)
 
 
-def irradiance_weights(directions: Float32) -> Float32:
+def _irradiance_weights(directions: Float32) -> Float32:
     """The weights of light from each of K directions (..., K, 3), which share the sphere evenly, in the terms of irradiance /
     pi: (..., K, 9) (Ramamoorthi and Hanrahan 2001).
     """

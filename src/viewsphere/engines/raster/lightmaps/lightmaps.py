@@ -51,7 +51,7 @@ INSET, OFF = 0.05, 1e-3
 
 
 @dataclass(frozen=True, eq=False)
-class Chart:
+class _Chart:
     """Triangles (T,) of one plane, in axes (3, 3): along both axes and the normal."""
 
     triangles: NDArray[np.int64]
@@ -104,7 +104,7 @@ def has_planes(corners: Float32, unit: float) -> bool:
     return next(_planes(corners.astype(np.float64), unit), None) is not None
 
 
-def _planes(corners: Float, unit: float) -> Iterator[Chart]:
+def _planes(corners: Float, unit: float) -> Iterator[_Chart]:
     """Yield the triangles of each plane that is large enough, as a chart."""
     a, b, c = corners.transpose(1, 0, 2)
     normals = np.cross(b - a, c - a)
@@ -121,7 +121,7 @@ def _planes(corners: Float, unit: float) -> Iterator[Chart]:
     stops = np.cumsum(np.bincount(plane))
     for k in np.flatnonzero(wide).tolist():
         own = solid[order[stops[k - 1] if k else 0 : stops[k]]]
-        yield Chart(own, _axes(normals[solid[first[k]]]))
+        yield _Chart(own, _axes(normals[solid[first[k]]]))
 
 
 def _axes(normal: Float) -> Float:
@@ -131,7 +131,7 @@ def _axes(normal: Float) -> Float:
     return np.stack([across, np.cross(normal, across), normal])
 
 
-def _pieces(chart: Chart, corners: Float, unit: float) -> Iterator[Chart]:
+def _pieces(chart: _Chart, corners: Float, unit: float) -> Iterator[_Chart]:
     """The chart's parts that are connected by common corners, if they are wide. Surfaces beyond a wall have light of their own,
     and half of a narrow strip may be inside a wall.
     """
@@ -144,7 +144,7 @@ def _pieces(chart: Chart, corners: Float, unit: float) -> Iterator[Chart]:
     area = np.bincount(piece, np.abs(ux * vy - uy * vx) / 2)
     around = np.bincount(piece, _borders(corner.reshape(-1, 3), flat), len(area))
     for k in np.flatnonzero((area >= LEAST) & (2 * area >= NARROW * around)).tolist():
-        yield Chart(chart.triangles[piece == k], chart.axes)
+        yield _Chart(chart.triangles[piece == k], chart.axes)
 
 
 def _borders(corner: NDArray[np.int64], flat: Float) -> Float:
@@ -159,14 +159,14 @@ def _borders(corner: NDArray[np.int64], flat: Float) -> Float:
     return (length * (counts[which.reshape(edges.shape)] == 1)).sum(axis=1)
 
 
-def _box(chart: Chart, corners: Float) -> Float:
+def _box(chart: _Chart, corners: Float) -> Float:
     """The chart's lowest and highest places along both axes, (2, 2)."""
     flat = (corners[chart.triangles] @ chart.axes[:2].T).reshape(-1, 2)
     return np.stack([flat.min(axis=0), flat.max(axis=0)])
 
 
 def _settled(
-    found: list[Chart],
+    found: list[_Chart],
     lows: NDArray[np.int64],
     wide: NDArray[np.int64],
     counts: NDArray[np.int64],

@@ -476,11 +476,11 @@ def _lobe_samples(rough: float, rings: int, width: int, levels: int) -> Float32:
 
 @lru_cache(maxsize=1)
 def lobe_albedo() -> Float32:
-    """The cached result of `make_lobe_albedo`."""
-    return kept_light(("lobe albedo",), make_lobe_albedo, ())
+    """The cached result of `_make_lobe_albedo`."""
+    return kept_light(("lobe albedo",), _make_lobe_albedo, ())
 
 
-def make_lobe_albedo(size: int = 32) -> Float32:
+def _make_lobe_albedo(size: int = 32) -> Float32:
     """The share of white light that GGX with height-correlated Smith reflects in total, (size, size, 2): by perceptual
     roughness and by the square root of the cosine to the viewer, both from 0 to 1.
 

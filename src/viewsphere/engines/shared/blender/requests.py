@@ -73,7 +73,7 @@ def scene_request(
     pictures = None
     if blend is None or not blend.is_lit:
         pictures = sky_pictures(scene.sky, scene.sun, scene.lights, scene.ground is not None)
-    middle = middle_of(geometry, sum(not p.scenery for p in things))
+    middle = _middle_of(geometry, sum(not p.scenery for p in things))
     lit = lamplight(scene, things, meshes, middle)
     has_scenery = any(p.scenery for p in things)
     return {
@@ -201,7 +201,7 @@ def extent(geometry: Geometry, has_scenery: bool) -> tuple[NDArray[np.float64], 
     return (np.zeros(3), 2.0 ** math.ceil(math.log2(unit))) if has_scenery else ((low + high) / 2, unit)
 
 
-def middle_of(geometry: Geometry, count: int) -> NDArray[np.float64]:
+def _middle_of(geometry: Geometry, count: int) -> NDArray[np.float64]:
     """Centre (3,) of the box around the first `count` things, in world metres."""
     low, high = geometry.extent(count)
     return (low + high) / 2

@@ -68,14 +68,14 @@ def save(shot: Shot, samples: Sequence[Sample], load: Load, file: Path, data: st
     return script + tuple(_lacking(samples, finishes, off / max(pose["distance"] for pose in request["poses"])))
 
 
-def is_clear(shot: Shot) -> bool:
+def _is_clear(shot: Shot) -> bool:
     """Return whether a shot's pictures have no background at all."""
     return picture_of(shot.channels) == "rgba"
 
 
 def shows_sky(shot: Shot, finish: Finish) -> bool:
     """Return whether a picture of a shot shows the sky behind all things."""
-    return not is_clear(shot) and finish.background.color is None and finish.background.image is None
+    return not _is_clear(shot) and finish.background.color is None and finish.background.image is None
 
 
 def _ask(stage: Arrangement, request: dict[str, Any], finishes: Sequence[Finish], camera: Camera, file: Path) -> float:
@@ -112,7 +112,7 @@ def _request(shot: Shot, samples: Sequence[Sample], finishes: Sequence[Finish], 
         "properties": {"data set": data, "frames": [sample.index for sample in samples]},
         "is_users": shot.scene.blend is not None,
         "is_open": not shows_sky(shot, finishes[0]),
-        "transparent": is_clear(shot),
+        "transparent": _is_clear(shot),
         "transform": views[0].transform,
         "exposures": [math.log2(EXPOSURE) + view.exposure for view in views],
         "temperature_k": views[0].temperature_k if temperatures else None,

@@ -28,14 +28,14 @@ class Numbered:
         *,
         counted: bool = True,
     ) -> Numbered:
-        """The numbers of a data set's classes. `stuff`, `things`: numbers by names, normalised by `plain` for things. Other
+        """The numbers of a data set's classes. `stuff`, `things`: numbers by names, normalised by `_plain` for things. Other
         stuff is 0. Other things are `other` or, if `counted`, are numbered from `other`.
         """
         numbers = {0: 0} | {i: stuff.get(name, 0) for name, i in STUFF_IDS.items()}
         own = dict[int, str]()
         for one in classes:
             if one.is_thing:
-                known = things.get(plain(one.name))
+                known = things.get(_plain(one.name))
                 if known is None:
                     known = other + len(own) * counted
                     own[known] = one.name
@@ -45,6 +45,6 @@ class Numbered:
         return cls(table, own)
 
 
-def plain(name: str) -> str:
+def _plain(name: str) -> str:
     """A name in small letters, words joined: `Traffic_sign` is `trafficsign`."""
     return "".join(character for character in name.casefold() if character.isalnum())

@@ -27,7 +27,7 @@ def tagged(array: NDArray[Any]) -> bytes:
     return FLO_TAG + np.array([width, height], "<i4").tobytes() + np.ascontiguousarray(array, "<f4").tobytes()
 
 
-def pfm(array: NDArray[Any]) -> bytes:
+def _pfm(array: NDArray[Any]) -> bytes:
     """A PFM file of numbers (H, W) or (H, W, 3): little-endian float32, the lowest row first."""
     head = f"{'PF' if array.ndim == 3 else 'Pf'}\n{array.shape[1]} {array.shape[0]}\n-1.0\n"
     return head.encode() + np.ascontiguousarray(array[::-1], "<f4").tobytes()
@@ -48,7 +48,7 @@ def flow_pfm(sample: Sample, channel: str, nothing: float = 0.0) -> Coded:
 
     def make() -> bytes:
         flow = sample.channels[channel]
-        return pfm(np.dstack((np.where(np.isnan(flow), np.float32(nothing), flow), np.zeros(flow.shape[:2], np.float32))))
+        return _pfm(np.dstack((np.where(np.isnan(flow), np.float32(nothing), flow), np.zeros(flow.shape[:2], np.float32))))
 
     return Coded(sample.index, f"{channel} {nothing}.pfm", make)
 
@@ -58,7 +58,7 @@ def map_pfm(sample: Sample, channel: str, nothing: float = 0.0) -> Coded:
 
     def make() -> bytes:
         array = sample.channels[channel].astype(np.float32)
-        return pfm(np.where(np.isnan(array), np.float32(nothing), array))
+        return _pfm(np.where(np.isnan(array), np.float32(nothing), array))
 
     return Coded(sample.index, f"{channel} {nothing}.pfm", make)
 

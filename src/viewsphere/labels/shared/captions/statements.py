@@ -115,12 +115,12 @@ def size_of(area: int, width: int, height: int) -> str:
     return "large" if share >= LARGE else "small" if share <= SMALL else ""
 
 
-def is_hidden(o: ObjectAnnotation) -> bool:
+def _is_hidden(o: ObjectAnnotation) -> bool:
     """Return whether much of an object's part inside the picture is hidden."""
     return o.truncation < 1 and 1 - o.visibility / (1 - o.truncation) >= HIDDEN
 
 
-def is_cut(o: ObjectAnnotation) -> bool:
+def _is_cut(o: ObjectAnnotation) -> bool:
     """Return whether an object is partly outside the picture."""
     return o.truncation >= CUT
 
@@ -154,9 +154,9 @@ def of_one(form: str, o: ObjectAnnotation, size: tuple[int, int], has_front: boo
         case "size":
             return f"fills a {extent} part of the picture" if (extent := size_of(o.area, *size)) else ""
         case "hidden":
-            return "is partly hidden" if is_hidden(o) else ""
+            return "is partly hidden" if _is_hidden(o) else ""
         case "cut":
-            return "is partly outside the picture" if is_cut(o) else ""
+            return "is partly outside the picture" if _is_cut(o) else ""
         case "view":
             return f"is seen from {side_of(o)}" if has_front else ""
         case _:

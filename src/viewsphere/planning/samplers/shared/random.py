@@ -53,7 +53,7 @@ def scene_names(recipe: Recipe) -> tuple[str, ...]:
             f"scenes.count: expected at most {recipe.max_frames:,} frames; found {count:,} scenes: set max_frames: {count} in "
             "the recipe if that is meant"
         )
-    check_surface(recipe)
+    _check_surface(recipe)
     return tuple(f"scene-{number:06d}" for number in range(count))
 
 
@@ -198,7 +198,7 @@ def _spec(piece: Piece, seed: int, subject: str) -> ModelSpec:
     )
 
 
-def check_surface(recipe: Recipe) -> None:
+def _check_surface(recipe: Recipe) -> None:
     """Raise RecipeError if models are to stand on a surface that no draw of the place has."""
     on, place = scenes_entry(recipe).surface, recipe.scene.place
     if isinstance(on, str):

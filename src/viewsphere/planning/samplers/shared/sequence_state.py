@@ -91,7 +91,7 @@ def sequence_state(context: SamplingContext, subject: str, start: int, box_of: B
     things = targets
     if context.composition is not None:
         things = context.composition.things(subject, targets, around, box_of, piece_moved, context.redraw)
-    ways = target_ways(context, subject, around, box_of)
+    ways = _target_ways(context, subject, around, box_of)
     if context.recipe.scenes is not None:
         among, beneath = scene_distractors(context, subject, around, box_of), scene_around(context, subject, around, box_of)
         own_ways = zip(among, ways[len(targets) :], strict=True)
@@ -115,7 +115,7 @@ def placed_targets(context: SamplingContext, subject: str, pose: str | None, box
     return still((spec,), (standing(box_of(spec)),))
 
 
-def target_ways(context: SamplingContext, subject: str, pose: str | None, box_of: BoxOf) -> tuple[Way | None, ...]:
+def _target_ways(context: SamplingContext, subject: str, pose: str | None, box_of: BoxOf) -> tuple[Way | None, ...]:
     """Return the path to its place of each target of a sequence, then of each distractor; None for a thing without a path."""
     if context.recipe.scenes is not None:
         layout = scene_laid(context, subject, pose, box_of)
