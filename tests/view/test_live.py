@@ -93,7 +93,7 @@ def test_columns_and_list_go_together(small_run):
     samples = list(Dataset(small_run))
     with looking(small_run) as live:
         assert read(live, len(samples))
-        known = live.known
+        known = live.snapshot
         assert sorted(known.frames["number"].tolist()) == [s.index for s in samples]
         for row, number in enumerate(known.frames["number"].tolist()):
             sample = samples[number]
@@ -117,7 +117,7 @@ def test_damage_is_told_and_the_rest_goes_on(small_dataset):
         assert "frames.json" in failures[0][1]
         assert str(small_dataset.root) not in failures[0][1]
         assert failures[1][1] == "it has no triangles: left.obj"
-        known = live.known
+        known = live.snapshot
         assert known.damaged.sum() == 2
         assert len(known.sound.frames) == 10
         with pytest.raises(StoreError):
@@ -208,7 +208,7 @@ def test_other_processes_read_many(small_run, tmp_path):
     frames = MANY + 100
     with looking(large_dataset(small_run, tmp_path / "large", frames)) as live:
         assert read(live, frames)
-        known = live.known
+        known = live.snapshot
         assert not known.damaged.any()
         assert known.frames["number"].tolist() == list(range(frames))
         assert len(known.table.objects) == frames

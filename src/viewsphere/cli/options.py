@@ -19,10 +19,10 @@ def explain(error: Any) -> None:
     if type(error).__name__ == "NoArgsIsHelpError":
         error.show()
         sys.exit(2)
-    complain(UserError(_said(error)), 2)
+    complain(UserError(_message_of(error)), 2)
 
 
-def _said(error: Any) -> str:
+def _message_of(error: Any) -> str:
     """Return the message of an error, with a hint to the help of its command."""
     from pydantic import ValidationError
 

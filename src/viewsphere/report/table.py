@@ -79,7 +79,7 @@ class _Names:
     codes: dict[str, int] = field(default_factory=dict[str, int])
 
     @property
-    def known(self) -> tuple[str, ...]:
+    def names(self) -> tuple[str, ...]:
         """The names, in the order of their numbers."""
         return tuple(self.codes)
 
@@ -125,7 +125,7 @@ class Columns:
     @property
     def table(self) -> FrameTable:
         """The table of the rows so far."""
-        names = (self._splits.known, self._subjects.known, self._models.known, self._poses.known)
+        names = (self._splits.names, self._subjects.names, self._models.names, self._poses.names)
         return FrameTable(self._frames.array, self._objects.array, *names)
 
     def extend(self, table: FrameTable) -> None:
@@ -177,7 +177,7 @@ def table_of(samples: Iterable[Sample]) -> FrameTable:
         frames.append((splits.code(sample.split), subjects.code(_subject(sample)), *_camera_columns(sample, seen)))
         objects += [(row, models.code(o.key), o.category_id, poses.code(o.pose_category), *_columns(o)) for o in sample.objects]
     return FrameTable(
-        np.array(frames, FRAME), np.array(objects, OBJECT), splits.known, subjects.known, models.known, poses.known
+        np.array(frames, FRAME), np.array(objects, OBJECT), splits.names, subjects.names, models.names, poses.names
     )
 
 

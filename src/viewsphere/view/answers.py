@@ -122,7 +122,7 @@ class Answers:
         """
         plain = dict(asked)
         first, count = _whole(plain, "first"), _whole(plain, "count")
-        known, listed, read = self._live.known, _whole(plain, "listed", -1), _whole(plain, "read", -1)
+        known, listed, read = self._live.snapshot, _whole(plain, "listed", -1), _whole(plain, "read", -1)
         listed = len(known.frames) if listed < 0 else min(listed, len(known.frames))
         read = known.read if read < 0 else min(read, known.read)
         query = Query.from_parameters(plain)
@@ -142,7 +142,7 @@ class Answers:
         )
 
     def _find(self, query: Query, listed: int, read: int) -> NDArray[np.intp]:
-        return query.answer(self._live.known.first(listed, read))
+        return query.answer(self._live.snapshot.first(listed, read))
 
     def _row(self, frame: int, made: float) -> dict[str, Any]:
         """A frame as in the report, with paths as layers; for an unreadable frame, the reason."""
@@ -173,7 +173,7 @@ class Answers:
         return Answer(picture, "image/webp", keep=3600)
 
     def _summary(self, asked: Parameters) -> Answer:
-        known = self._live.known
+        known = self._live.snapshot
         with self._counting:
             if self._counted is None or (self._counted[0] != known.read and time.monotonic() - self._counted[1] > RENEWED):
                 found = {**summary(self._live.dataset, known.sound), "sequences": 0, "read": known.read}
@@ -185,7 +185,7 @@ class Answers:
         info = next((info for info in dataset.models if info.key == key), None)
         if info is None:
             raise UserError(f"key: expected one of {len(dataset.models):,} models, found {key!r:.100}")
-        return _as_json(model_data(dataset, info, self._live.known.sound))
+        return _as_json(model_data(dataset, info, self._live.snapshot.sound))
 
     def _facts(self, asked: Parameters) -> Answer:
         return _as_json(without_folders(facts(self._live.dataset, self._live.times())))

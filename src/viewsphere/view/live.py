@@ -126,7 +126,7 @@ class Live:
         self._thread.join()
 
     @property
-    def known(self) -> Known:
+    def snapshot(self) -> Known:
         """The current state; it does not change when more frames arrive."""
         with self._lock:
             return Known(self._frames.array, self._columns.table, self._damaged.array)
@@ -167,7 +167,7 @@ class Live:
         It has the frames planned (without frames left out), left out, finished and with columns. It also has frames a second,
         seconds left, failures, and the age of the newest frame.
         """
-        known, failures, now = self.known, self.failures(), time.time()
+        known, failures, now = self.snapshot, self.failures(), time.time()
         left_out = self._left_out(failures)
         finished, planned = len(known.frames), self.dataset.plan.frames - left_out
         made = known.frames["made"]

@@ -17,7 +17,7 @@ import numpy as np
 from viewsphere.errors import StoreError, UserError
 from viewsphere.files import read_bytes
 from viewsphere.formats.coco.categories import KEYPOINTS, named_points
-from viewsphere.formats.coco.source_metadata import licences_by_id, licensed, said
+from viewsphere.formats.coco.source_metadata import licences_by_id, licensed, metadata_of_splits
 from viewsphere.formats.shared.reading.exif import shown_size, upright
 from viewsphere.geometry.mask import rle_of_polygons, rle_of_runs, rle_runs
 from viewsphere.model.sample import Box, Sample
@@ -87,7 +87,7 @@ def read(path: Path, *, keep_going: bool = False) -> ForeignDataset:
         max_objects=max(1, *(len(found) for part in parts for found in part.annotations.values()), 1),
         frames=partial(_frames, parts),
         left_out=tuple(problems),
-        said=said((part.split, part.head) for part in parts),
+        said=metadata_of_splits((part.split, part.head) for part in parts),
     )
 
 
@@ -221,7 +221,7 @@ def _annotation_problem(
 
 def _points(head: dict[str, Any]) -> dict[int, tuple[str, ...]]:
     """Names of the points of each category with points."""
-    named = said([("", head)]).get("categories", {})
+    named = metadata_of_splits([("", head)]).get("categories", {})
     categories = (c for c in head.get("categories", ()) if isinstance(c, dict) and _is_id(c.get("id")))
     points = {c["id"]: named.get(str(c.get("name")), {}).get(KEYPOINTS) for c in categories}
     return {number: tuple(names) for number, names in points.items() if names}

@@ -19,7 +19,7 @@ Said = Mapping[str, Any]
 """`info`: by split; `licenses`: a list; `categories`: the other keys by name."""
 
 
-def said(splits: Iterable[tuple[str, Mapping[str, Any]]]) -> dict[str, Any]:
+def metadata_of_splits(splits: Iterable[tuple[str, Mapping[str, Any]]]) -> dict[str, Any]:
     """Return the metadata of COCO's files, each given with its split's name, for the plan. If two files define the same name,
     the first wins. Raises ValueError for numbers that JSON does not have.
     """

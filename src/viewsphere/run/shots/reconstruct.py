@@ -169,7 +169,7 @@ class ViewReconstructor:
 
         def mesh(thing: Thing) -> Mesh:
             if not thing.id:
-                return self._scenery.known(around, thing)
+                return self._scenery.unchanged_mesh(around, thing)
             return self._mesh(step_key(self._keys.get(thing.id, thing.model.key), thing.step and thing.step.frame))
 
         return views_of(shot.model_copy(update={"things": (*shot.things, *around.things)}), mesh)

@@ -66,7 +66,7 @@ class Scenery:
                 self.notes.append(f"background not checked where {thing.key} stands: {error}")
         return self._known[digest]
 
-    def known(self, record: SceneryRecord, thing: Thing) -> Mesh:
+    def unchanged_mesh(self, record: SceneryRecord, thing: Thing) -> Mesh:
         """The mesh of scenery that is known to be unchanged."""
         mesh = self.mesh(record, thing)
         assert mesh is not None

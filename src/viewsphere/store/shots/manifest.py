@@ -134,15 +134,15 @@ class Manifest:
         at, size, told = self.spans[path]
         data = byte_range(holder, at, size)
         if digest(data) != told:
-            found = _said((len(data), digest(data)))
-            raise StoreError(f"{holder}: {path}: expected {_said((size, told))}, found {found}: {REPAIR}")
+            found = _in_words((len(data), digest(data)))
+            raise StoreError(f"{holder}: {path}: expected {_in_words((size, told))}, found {found}: {REPAIR}")
         return data
 
     def check(self, path: str, data: bytes, file: Path) -> None:
         """Raise StoreError if the bytes of the file at `path` in the folder changed since they were written."""
         seal = self.files.get(path)
         if seal != (len(data), digest(data)):
-            raise StoreError(f"{file}: expected {_said(seal)}, found {_said((len(data), digest(data)))}: {REPAIR}")
+            raise StoreError(f"{file}: expected {_in_words(seal)}, found {_in_words((len(data), digest(data)))}: {REPAIR}")
 
     def damage(self, folder: Path) -> Iterator[str]:
         """Yield the differences from the written state: files that are missing, changed, or additional."""
@@ -153,10 +153,10 @@ class Manifest:
                 yield str(error)
                 continue
             except OSError as error:
-                yield f"{folder / path}: expected {_said(told)}, found {error.strerror or error}"
+                yield f"{folder / path}: expected {_in_words(told)}, found {error.strerror or error}"
                 continue
             if seal != told:
-                yield f"{folder / path}: expected {_said(told)}, found {_said(seal)}"
+                yield f"{folder / path}: expected {_in_words(told)}, found {_in_words(seal)}"
         yield from (f"{path}: expected no such file" for path in self._strangers(folder))
 
     def _strangers(self, folder: Path) -> Iterable[Path]:
@@ -200,6 +200,6 @@ REPAIR = "mend it with viewsphere check --repair"
 """The fix for damaged files, for messages."""
 
 
-def _said(told: Seal | None) -> str:
+def _in_words(told: Seal | None) -> str:
     """A file's size and the beginning of its digest, in words."""
     return "no such file" if told is None else f"{told[0]:,} bytes with digest {told[1][:12]}"

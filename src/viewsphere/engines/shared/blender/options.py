@@ -36,7 +36,7 @@ class Common:
     settings: Mapping[str, JsonValue] = field(default_factory=dict[str, JsonValue])
 
     @property
-    def draws(self) -> bool:
+    def uses_opengl(self) -> bool:
         """Return whether the renderer draws through OpenGL."""
         return self.renderer != "cycles"
 

@@ -100,7 +100,7 @@ class Keeper:
             self.drop()
         if self.process is None:
             self.process, self._started_for = _started(self.python, *wanted), wanted
-        if stage.options.draws and stage.options.renderer not in self._drawing:
+        if stage.options.uses_opengl and stage.options.renderer not in self._drawing:
             self._try_drawing(self.process, stage.options)
         self._stage, self._served = None, self._served + 1
         stage.tell(self.process, levels)
@@ -281,7 +281,7 @@ class Arrangement:
         """A `picture`, scene-linear, premultiplied, (H, W, 4) float32, and its other wanted results (see `COMPONENTS`); with
         `is_open`, the background stays empty.
         """
-        if self.options.draws:
+        if self.options.uses_opengl:
             return {"picture": self._drawn(camera, is_open, visibility, sweeping)}
         return self.rendered(camera, is_open, sweeping=sweeping, wanted=wanted)
 
@@ -368,7 +368,7 @@ class Arrangement:
         None is used with OpenGL, which has mip levels; in a user's .blend scene, whose mirrors, lenses or compositor may
         magnify a texture; and with a script, whose materials must not change.
         """
-        if self.options.draws or self.shot.scene.blend is not None or self.options.script is not None:
+        if self.options.uses_opengl or self.shot.scene.blend is not None or self.options.script is not None:
             return None
         return tuple(kind.levels(cameras) for kind in self.kinds)
 
@@ -420,7 +420,7 @@ def build_stage(shot: Shot, load: Load) -> CyclesStage:
     Raises RecipeError for an option, or a ground, that its renderer does not have.
     """
     options = options_of(shot.engine, shot.engine_options)
-    if options.draws and shot.scene.ground is not None and shot.scene.ground.catcher:
+    if options.uses_opengl and shot.scene.ground is not None and shot.scene.ground.catcher:
         raise RecipeError(
             f"scene.ground: expected on, off or a material for engine: {options.renderer}, found catcher, which auto is before "
             "background: environment: set it to off, or take engine: cycles or raster"
