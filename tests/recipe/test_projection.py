@@ -9,7 +9,8 @@ import pytest
 
 from installed import example, installed
 from small import small_recipe
-from viewsphere import Recipe, plan
+from viewsphere import Dataset, Recipe, generate, plan
+from viewsphere.check import check
 from viewsphere.errors import RecipeError
 from viewsphere.recipe.cameras.rig import SensorEntry
 from viewsphere.recipe.world.scene import CameraEntry
@@ -82,3 +83,9 @@ def test_a_sensor_has_it_too_and_shares_a_cameras():
     assert own.lens(straight).intrinsics.fx == 32
     with pytest.raises(ValueError, match="expected none beside projection: barrel"):
         SensorEntry.model_validate({"projection": "barrel", "k": -0.1, "fov_deg": 40})
+
+
+@pytest.mark.usefixtures("barrel")
+def test_a_data_set_made_with_it_passes_check(tmp_path):
+    generate(small_recipe(camera=CAMERA, formats=[]), tmp_path / "out", workers=0)
+    assert not check(Dataset(tmp_path / "out")).findings

@@ -85,7 +85,7 @@ class WithProjection(Frozen):
 
     @classmethod
     def _check_alone(cls, name: str, given: Mapping[str, Any]) -> None:
-        beside = [field for field in cls.LENS if given.get(field) is not None]
+        beside = [field for field in cls.LENS if given.get(field) not in (None, cls.model_fields[field].default)]
         if beside:
             with error_at(beside[0]):
                 raise ValueError(
