@@ -34,7 +34,7 @@ def _rays(lens: Lens, xy: Float) -> Rays:
     from viewsphere.geometry.lenses.shared import kernels_lens as kernels
 
     k, out = lens.parameters.coefficients, np.empty((len(xy), 3))
-    kernels.rays_fisheye(np.array(k), _limit(k), lens.intrinsics.K, xy, out)
+    kernels.rays_fisheye(np.array(k), limit(k), lens.intrinsics.K, xy, out)
     return central(out)
 
 
@@ -43,7 +43,7 @@ def _project(lens: Lens, points: Float) -> Float:
     from viewsphere.geometry.lenses.shared import kernels_lens as kernels
 
     k, out = lens.parameters.coefficients, np.empty((len(points), 2))
-    kernels.distort_fisheye(np.array(k), _limit(k), points, out)
+    kernels.distort_fisheye(np.array(k), limit(k), points, out)
     return lens.positions(*out.T)
 
 
@@ -52,7 +52,7 @@ def _bounds(
 ) -> tuple[Bounds | None, bool]:
     """The box of the bent edges, to 1e-5 px; triangles are cut at the limit."""
     k = lens.parameters.coefficients
-    return bent_bounds(BentLens(True, k, _limit(k), lens.intrinsics.K), R, t, vertices, is_used, triangles)
+    return bent_bounds(BentLens(True, k, limit(k), lens.intrinsics.K), R, t, vertices, is_used, triangles)
 
 
 def _focal(fov: float, extent: float) -> float:
@@ -66,7 +66,7 @@ def _as_opencv(lens: Any) -> OpenCVLens:
 
 
 @lru_cache(maxsize=64)
-def _limit(k: tuple[float, ...]) -> float:
+def limit(k: tuple[float, ...]) -> float:
     """The largest angle, radians, up to which the radius rises with the angle, so that the lens map is one-to-one."""
     slope = np.array([9 * k[3], 7 * k[2], 5 * k[1], 3 * k[0], 1.0])
     return min(math.pi, math.sqrt(first_positive_root(slope)))
