@@ -210,6 +210,18 @@ def test_folders_that_killed_processes_left_are_removed():
     assert not half.exists()
 
 
+def test_entries_that_others_are_writing_count_too(monkeypatch):
+    monkeypatch.setenv("VIEWSPHERE_CACHE_LIMIT", "1MB")
+    for number in range(9):
+        write(str(number), 100_000)
+    assert total() > 900_000
+    half = cache_of("light") / f"{PREFIX}{of_this_process()}abc"
+    half.mkdir()
+    (half / "a.arrays").write_bytes(bytes(60_000))
+    write("last", 40_000)
+    assert total() + 60_000 <= 1_000_000
+
+
 WRITER = """
 import sys
 import numpy as np

@@ -84,7 +84,7 @@ def test_presets_differ_and_other_options_change_them():
 )
 def test_a_wrong_option_is_one_line(name, given, said):
     with pytest.raises(RecipeError, match=said) as caught:
-        {"eevee": eevee, "workbench": workbench}[name].check(given)
+        {"eevee": eevee, "workbench": workbench}[name].ENGINE.check(given)
     assert "\n" not in str(caught.value)
 
 

@@ -74,9 +74,27 @@ def make_room(size: int) -> None:
     the limit. Raises OSError if the cache cannot be written.
     """
     if _is_look_due(size):
-        held = sum(entry.size for entry in entries()) + size
+        held = _unfinished() + sum(entry.size for entry in entries())
         if held > limits.CACHE_LIMIT * (1 - CHECKED_SHARE):
             prune(int(limits.CACHE_LIMIT * KEPT_SHARE) - size)
+
+
+def _unfinished() -> int:
+    """Return the bytes of the entries that all processes are writing now, the caller's included.
+
+    Processes that look at the same moment thus count one another's entries. Call this before `entries`, so that an entry that
+    is finished in between counts twice, not never.
+    """
+    held = 0
+    for kind in KINDS:
+        for folder, folders, names in os.walk(cache_of(kind)):
+            if folder != str(cache_of(kind)):
+                for name in names:
+                    with suppress(OSError):  # finished meanwhile
+                        held += Path(folder, name).lstat().st_size
+            else:
+                folders[:] = (name for name in folders if "~" in name)
+    return held
 
 
 def _is_look_due(size: int) -> bool:

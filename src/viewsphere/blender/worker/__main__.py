@@ -44,7 +44,7 @@ def _main(folder: Path, readable: list[str] | None = None, threads: int = 0) -> 
     requests: SimpleQueue[bytes] = SimpleQueue()
     threading.Thread(target=_read, args=(requests, folder), daemon=True).start()
     with suppress(Exception), few_cores(threads):  # the first request is answered with the error
-        _start_blender()
+        start_blender()
     while True:
         said = _answer(requests.get())
         try:
@@ -70,7 +70,7 @@ def _answer(request: bytes) -> bytes:
         do = told.pop("do", None)
         if do not in REQUESTS:
             raise ValueError(f"do: expected one of {', '.join(REQUESTS)}; found {do!r}")
-        _start_blender()
+        start_blender()
         return json.dumps({"ok": REQUESTS[do](told)}).encode()
     except (Exception, SystemExit) as error:
         traceback.print_exc()
@@ -79,7 +79,7 @@ def _answer(request: bytes) -> bytes:
 
 
 @cache
-def _start_blender() -> None:
+def start_blender() -> None:
     """Import bpy and forbid files to run scripts or to use the network."""
     import bpy
 
