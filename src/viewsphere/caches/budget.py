@@ -87,13 +87,10 @@ def _unfinished() -> int:
     """
     held = 0
     for kind in KINDS:
-        for folder, folders, names in os.walk(cache_of(kind)):
-            if folder != str(cache_of(kind)):
-                for name in names:
-                    with suppress(OSError):  # finished meanwhile
-                        held += Path(folder, name).lstat().st_size
-            else:
-                folders[:] = (name for name in folders if "~" in name)
+        for folder, _, names in os.walk(cache_of(kind)):
+            for name in names if "~" in Path(folder).name else ():
+                with suppress(OSError):  # finished meanwhile
+                    held += Path(folder, name).lstat().st_size
     return held
 
 

@@ -131,8 +131,8 @@ def families_named(name: str) -> Iterator[ZooFamily]:
 
 
 def _asked(prefix: str, otherwise: Any, ask: Callable[..., Any], *about: str) -> Any:
-    """What a source answers about everything it has; `otherwise` where a plug-in of a third party fails, because the error
-    concerns only recipes that name it.
+    """The answer of a source about everything it has, or `otherwise` if a third party's plug-in fails: its error concerns only
+    recipes that name it.
     """
     try:
         return ask(*about)
