@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from viewsphere.caches.arrays import read_arrays, write_arrays
-from viewsphere.engines.raster.kept_light import pack_records, unpack_records
+from viewsphere.rendering.kept_light import pack_records, unpack_records
 
 
 class Inner(NamedTuple):

@@ -12,12 +12,12 @@ from light_stage import LightStage, Samples, ball, cuboid, distances, flat, poin
 
 import viewsphere_zoo as zoo
 from quick import quick
-from viewsphere.engines.raster import kept_light
 from viewsphere.engines.raster.materials.kernels_material import L_CASTS_FROM
 from viewsphere.engines.raster.shadows import occlusion
 from viewsphere.engines.raster.shadows.occlusion import NO_OCCLUSION, bake_occlusion, sky_directions, with_ground_light
 from viewsphere.geometry.camera import orbit_center, orbit_rotation
 from viewsphere.model.sensors.camera import Camera, Intrinsics
+from viewsphere.rendering import kept_light
 from viewsphere.rendering.sky.sun import Distant
 
 

@@ -78,7 +78,7 @@ def has(name: str) -> bool:
     return any(_is_trusted(folder, name) and os.access(folder / name, os.R_OK) for folder in (SHIPPED, *folders()))
 
 
-def is_private(about: os.stat_result) -> bool:
+def _is_private(about: os.stat_result) -> bool:
     """True if only this user and root can write a file or folder; always True on systems without file owners."""
     return _is_owned(about) and (not hasattr(os, "geteuid") or not about.st_mode & (S_IWGRP | S_IWOTH))
 
@@ -94,7 +94,7 @@ def _read(folder: Path, name: str) -> bytes | None:
             return None
         with os.fdopen(os.open(folder / name, _OPEN), "rb") as file:
             about = os.fstat(file.fileno())
-            return file.read() if S_ISREG(about.st_mode) and (folder == SHIPPED or is_private(about)) else None
+            return file.read() if S_ISREG(about.st_mode) and (folder == SHIPPED or _is_private(about)) else None
     except OSError:
         return None
 
@@ -111,7 +111,7 @@ def _is_own(folder: Path) -> bool:
             about = folder.stat()
     except OSError:
         return False
-    if not is_private(about):
+    if not _is_private(about):
         _warn(folder)
         return False
     return True

@@ -10,6 +10,7 @@ from pathlib import Path
 from viewsphere.errors import ModelError, RecipeError, ViewsphereError, WorkerDied, joined
 from viewsphere.planning.distances import Distances
 from viewsphere.planning.extension import DatasetPart
+from viewsphere.rendering.sky.environment_file import environment_notes
 from viewsphere.run.executors import Job, Listed, Outcome, Work, WorkerPool
 from viewsphere.run.missing import Missing
 from viewsphere.run.opening import commit
@@ -42,10 +43,8 @@ def check_skies(work: Missing, tell: Listener) -> tuple[str, ...]:
     chosen = list(files)[:: -(-len(files) // MOST_SKIES) or 1]
     notes: list[str] = []
     for done, file in enumerate(chosen):
-        from viewsphere.rendering.sky.environment_file import read_environment  # takes a third of a second to load
-
         tell(Progress("skies", done, len(chosen)))
-        notes += read_environment(Path(file)).notes
+        notes += environment_notes(Path(file))
         tell(Progress("skies", done + 1, len(chosen)))
     return tuple(notes)
 

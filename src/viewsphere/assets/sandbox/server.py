@@ -25,7 +25,7 @@ them.
 
 
 @dataclass(frozen=True)
-class Ended:
+class _Ended:
     """The end of a job: the exit code of its process, or minus the signal that killed it; and whether it took too long."""
 
     code: int
@@ -75,7 +75,7 @@ class ReaderProcess:
                 setting,
             )
 
-    def answer(self, job: Job) -> tuple[Ended, bool]:
+    def answer(self, job: Job) -> tuple[_Ended, bool]:
         """Return the end of a job, and whether the reader waits for another. If the reader itself ended, the result is its exit
         code.
         """
@@ -90,8 +90,8 @@ class ReaderProcess:
                 self.process.stdin.flush()
             line = self.process.stdout.readline()
             if line:
-                return Ended(int(line), is_late=False), True
-            return Ended(self.process.wait(), late.is_set()), False
+                return _Ended(int(line), is_late=False), True
+            return _Ended(self.process.wait(), late.is_set()), False
         except BaseException:
             self.kill()
             raise
@@ -114,7 +114,7 @@ class ReaderProcess:
                     pipe.close()
 
 
-def do(job: Job) -> Ended:
+def do(job: Job) -> _Ended:
     """Do a job in a separate process; raises OSError or ValueError if none can be started."""
     idle, setting = _idle_readers(os.getpid()), Setting.current()
     for reader, is_new in _readers(idle, setting, Path(job.folder) / LOG):

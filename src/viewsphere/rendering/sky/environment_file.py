@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import hashlib
 import re
 from dataclasses import dataclass
+from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
@@ -13,13 +15,17 @@ from numpy.typing import NDArray
 from viewsphere.assets.paths.folder import UnreadableError
 from viewsphere.errors import RecipeError
 from viewsphere.files import check_file, open_file, read_bytes
+from viewsphere.limits import limits
+from viewsphere.rendering.kept_light import kept_light
 from viewsphere.rendering.sky.environment_head import EXPECTED, ExrHead, HdrHead, check_shape, openexr, read_head, silenced
-from viewsphere.rendering.sky.kernels_rgbe import decode_rows
 
 Float32 = NDArray[np.float32]
 
 FIELD = "scene.sky.hdri"
 """The recipe's field that names environment pictures, for messages."""
+
+LIBRARIES = ("openexr", "pillow")
+"""Packages that decode environment pictures."""
 
 SHARPEST = 4096
 """Greatest width, in texels, at which an environment is kept."""
@@ -32,7 +38,7 @@ _ROUNDING = -1e-3  # negative radiance down to this counts as a compression erro
 @dataclass(frozen=True, eq=False)
 class EnvironmentPicture:
     """pixels (H, W, 3) float32: linear radiance, none negative, rows from the zenith down; notes: the repairs that were
-    needed.
+    needed, without the file's name.
     """
 
     pixels: Float32
@@ -53,6 +59,33 @@ def read_environment(path: Path) -> EnvironmentPicture:
         raise RecipeError(f"{FIELD}: {error}") from None
 
 
+def environment_digest(path: Path) -> str:
+    """The digest of everything from which `read_environment` computes its result. Raises RecipeError if the file cannot be
+    read.
+    """
+    try:
+        with open_file(path, "MAX_PICTURE_BYTES") as file:
+            content = hashlib.file_digest(file, "sha256").hexdigest()
+    except OSError as error:
+        raise RecipeError(f"{FIELD}: {_error(path, f'found {error.strerror or error}')}") from None
+    return " ".join([content, *map(_version, LIBRARIES), str(limits.MAX_PICTURE_PIXELS)])
+
+
+def environment_notes(path: Path) -> tuple[str, ...]:
+    """The repairs that a picture needs. Unlike `read_environment`, does not decode a picture whose result the cache holds;
+    raises as it does.
+    """
+    notes = kept_light(("repairs", environment_digest(path)), lambda: read_environment(path).notes, ())
+    return tuple(f"{path}: {note}" for note in notes)
+
+
+def _version(library: str) -> str:
+    try:
+        return version(library)
+    except PackageNotFoundError:
+        return "none"
+
+
 def _read(path: Path) -> EnvironmentPicture:
     notes: list[str] = []
     head = read_head(path)
@@ -62,7 +95,7 @@ def _read(path: Path) -> EnvironmentPicture:
         pixels = _read_hdr(path, head)
     else:
         pixels = _read_ordinary(path)
-        notes.append(f"{path}: expected an EXR or HDR picture; 8 bits cannot hold a bright light, taken as sRGB")
+        notes.append("expected an EXR or HDR picture; 8 bits cannot hold a bright light, taken as sRGB")
     return EnvironmentPicture(_reduced(_mended(path, pixels, notes)), tuple(notes))
 
 
@@ -89,6 +122,8 @@ def _read_exr(path: Path, head: ExrHead) -> Float32:
 
 
 def _read_hdr(path: Path, head: HdrHead) -> Float32:
+    from viewsphere.rendering.sky.kernels_rgbe import decode_rows  # whose kernels take a third of a second to load
+
     data = read_bytes(path, "MAX_PICTURE_BYTES")
     body = np.frombuffer(data, np.uint8)[data.index(head.text.splitlines()[-1]) :]
     body = body[int(np.argmax(body == ord("\n"))) + 1 :]
@@ -143,10 +178,10 @@ def _mended(path: Path, pixels: Float32, notes: list[str]) -> Float32:
     if bad:
         greatest = np.where(finite, pixels, 0).max()
         pixels = np.where(finite, pixels, np.where(pixels > 0, greatest, 0)).astype(np.float32)
-        notes.append(f"{path}: mended {bad:,} texels that are no numbers, or above {_BRIGHTEST:g}")
+        notes.append(f"mended {bad:,} texels that are no numbers, or above {_BRIGHTEST:g}")
     negative = int((pixels < _ROUNDING).any(axis=-1).sum())
     if negative:
-        notes.append(f"{path}: set {negative:,} texels with negative light to 0")
+        notes.append(f"set {negative:,} texels with negative light to 0")
     pixels = np.maximum(pixels, 0)
     if not pixels.any():
         raise _error(path, "found no light in it: all texels are black; take another")

@@ -43,7 +43,7 @@ def sky_pictures(sky: AnySky, sun: Sun | None, lights: Sequence[AnyLight], has_g
     Without a ground, the area below a synthetic sky is grey and reflects the light that it receives. Raises RecipeError when a
     picture cannot be read.
     """
-    from viewsphere.rendering.sky.environment_file import read_environment  # whose kernels take a second to load
+    from viewsphere.rendering.sky.environment_file import read_environment  # imports llvmlite, which planning does not need
 
     even = even_light(lights)
     if isinstance(sky, Environment):

@@ -36,7 +36,6 @@ from viewsphere.engines.raster.indirect.kernels_bounce import COLUMNS, terms
 from viewsphere.engines.raster.indirect.kernels_emissive import shine_at, shine_at_probes, shine_near
 from viewsphere.engines.raster.indirect.kernels_views import FOLD, NODES, send_views, spread_views
 from viewsphere.engines.raster.indirect.radiosity_patches import Patches, Rays, Table, patches_of
-from viewsphere.engines.raster.kept_light import digest_of, kept_light
 from viewsphere.engines.raster.lightmaps.lightmaps import Charts, has_planes
 from viewsphere.engines.raster.lightmaps.vertex_light import Facets, Sites
 from viewsphere.engines.raster.records import (
@@ -57,6 +56,7 @@ from viewsphere.engines.raster.reflections.tracing import Tree, tree_of
 from viewsphere.engines.raster.shadows.shadow_maps import Lights
 from viewsphere.engines.raster.sky.environment import Surrounding, sky_along
 from viewsphere.engines.raster.sky.kernels_environment import LAMPS
+from viewsphere.rendering.kept_light import digest_of, kept_light
 
 Float = NDArray[np.float64]
 

@@ -15,7 +15,6 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from viewsphere.engines.raster.kept_light import kept_light
 from viewsphere.engines.raster.materials.kernels_material import L_CASTS_FROM
 from viewsphere.engines.raster.records import Float32
 from viewsphere.engines.raster.shading.kernels_block import BLOCK, ROWS
@@ -24,6 +23,7 @@ from viewsphere.engines.raster.shadows.arriving import arriving
 from viewsphere.engines.raster.shadows.kernels_direct_light import DISTANT
 from viewsphere.engines.raster.shadows.shadow_maps import Casters, Lights, Views, draw_views, parallel_view
 from viewsphere.geometry.rotation import product, transform
+from viewsphere.rendering.kept_light import kept_light
 
 Float = NDArray[np.float64]
 Quality = Literal["off", "fast", "fine"]

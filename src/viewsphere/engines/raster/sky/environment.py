@@ -12,15 +12,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewsphere.engines.raster.indirect.kernels_probes import sky_from
-from viewsphere.engines.raster.kept_light import kept_light
 from viewsphere.engines.raster.records import Float32, Int32, PictureRays
 from viewsphere.engines.raster.shadows.arriving import arriving
 from viewsphere.engines.raster.shadows.kernels_direct_light import DISTANT
 from viewsphere.engines.raster.shadows.shadow_maps import Extent, Lights
 from viewsphere.engines.raster.sky import kernels_environment as kernels
 from viewsphere.model.scene import AnySky, Daylight, Environment, Sky, Sun
+from viewsphere.rendering.kept_light import kept_light
 from viewsphere.rendering.sky.daylight import daylight_picture, opening
-from viewsphere.rendering.sky.environment_file import read_environment
+from viewsphere.rendering.sky.environment_file import environment_digest, read_environment
 from viewsphere.rendering.sky.sky import HALO, SURROUNDINGS, gradient_share
 from viewsphere.rendering.sky.sun import Distant, sun_light
 
@@ -113,7 +113,6 @@ class _Maps(NamedTuple):
 class _Photographed(NamedTuple):
     maps: _Maps
     sun: Distant | None
-    notes: tuple[str, ...]
 
 
 def sky_lights(sky: AnySky, sun: Sun | None, has_ground: bool) -> tuple[Distant, ...]:
@@ -265,7 +264,11 @@ def _make_gradient_maps() -> _Maps:
 @lru_cache(maxsize=4)
 def _daylight_maps(turbidity: float, clouds: float, elevation_deg: float) -> _Maps:
     sky = Daylight(turbidity=turbidity, clouds=clouds)
-    return _maps(daylight_picture(elevation_deg, sky, _SKY_HEIGHT), _SKY_WIDTH, True)
+
+    def make() -> _Maps:
+        return _maps(daylight_picture(elevation_deg, sky, _SKY_HEIGHT), _SKY_WIDTH, True)
+
+    return kept_light(("daylight", turbidity, clouds, elevation_deg), make, (_Maps,))
 
 
 def _key(file: str) -> tuple[str, int, int]:
@@ -279,9 +282,14 @@ def _key(file: str) -> tuple[str, int, int]:
 
 @lru_cache(maxsize=3)
 def _photographed(key: tuple[str, int, int], has_ground: bool) -> _Photographed:
-    file = read_environment(Path(key[0]))
-    left, sun = without_sun(file.pixels)
-    return _Photographed(_maps(left, _PICTURE_WIDTH, has_ground, file.pixels), sun, file.notes)
+    file = Path(key[0])
+
+    def make() -> _Photographed:
+        pixels = read_environment(file).pixels
+        left, sun = without_sun(pixels)
+        return _Photographed(_maps(left, _PICTURE_WIDTH, has_ground, pixels), sun)
+
+    return kept_light(("photographed", environment_digest(file), has_ground), make, (_Photographed, _Maps, Distant))
 
 
 def without_sun(pixels: Float32) -> tuple[Float32, Distant | None]:

@@ -6,11 +6,11 @@ from PIL import Image
 
 from scratch import scratch_cache
 from viewsphere.caches import cache_of
-from viewsphere.engines.raster import kept_light
 from viewsphere.engines.raster.baking import _floor
 from viewsphere.engines.raster.materials.surface import Lengths
 from viewsphere.engines.raster.records import NO_LIGHTMAP, Lightmap
 from viewsphere.model.scene import Ground
+from viewsphere.rendering import kept_light
 
 HERE = Lengths((0.0, 0.0, 0.0), 1.0)
 

@@ -45,7 +45,7 @@ def digest_of(content: Iterable[Any]) -> str:
 @cache
 def _sources() -> str:
     """The digest of the sources, of the kernels' build, and of the processor's type, which affects numpy's sines."""
-    package = Path(__file__).parents[2]
+    package = Path(__file__).parents[1]
     return " ".join([HOST, np.__version__, *(package_digest(package / name) for name in PACKAGES)])
 
 
