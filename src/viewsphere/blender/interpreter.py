@@ -76,7 +76,7 @@ class Library:
 
 
 @dataclass(frozen=True)
-class Graphics:
+class _Graphics:
     """The OpenGL driver of EEVEE and Workbench, if known; or the reason why they cannot draw."""
 
     driver: str | None = None
@@ -92,7 +92,7 @@ class Blender:
     devices: tuple[Device, ...] = ()
     problem: str | None = None
     missing: tuple[Library, ...] = ()
-    graphics: Graphics | None = None
+    graphics: _Graphics | None = None
 
     @property
     def cure(self) -> str | None:
@@ -132,12 +132,12 @@ def probe(python: Path) -> Blender:
     return Blender(python, told["version"], devices, graphics=graphics)
 
 
-def _graphics(process: BlenderProcess) -> Graphics:
+def _graphics(process: BlenderProcess) -> _Graphics:
     """Return whether OpenGL drawing works, tried with Workbench: EEVEE draws the same way, but compiles its shaders first."""
     try:
-        return Graphics(process.ask("draw", DRAW_S, renderer="workbench")["driver"])
+        return _Graphics(process.ask("draw", DRAW_S, renderer="workbench")["driver"])
     except (BlenderError, BlenderDied) as error:
-        return Graphics(problem=f"{error.how}: {GRAPHICS}")
+        return _Graphics(problem=f"{error.how}: {GRAPHICS}")
 
 
 def missing_libraries(said: str) -> tuple[Library, ...]:

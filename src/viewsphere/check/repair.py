@@ -22,14 +22,14 @@ from viewsphere.store.credits import CREDITS, write_credits
 
 
 @dataclass(frozen=True)
-class Repaired:
+class _Repaired:
     """The repairs, in words, and the report of `check` on the repaired data set; failed repairs are findings."""
 
     done: tuple[str, ...]
     report: Report
 
 
-def repair(root: Path | str, *, workers: int = 0, listener: Listener | None = None, **options: Any) -> Repaired:
+def repair(root: Path | str, *, workers: int = 0, listener: Listener | None = None, **options: Any) -> _Repaired:
     """Check a data set, and remake models, shots and exports that have changed. Shots are remade if they are damaged or
     missing, or if they contradict recomputed values. `options` are those of `check`.
 
@@ -48,7 +48,7 @@ def repair(root: Path | str, *, workers: int = 0, listener: Listener | None = No
         mending.credits(report.findings)
         mending.exports(report.findings)
     report = check(Dataset(root), workers=workers, **options) if mending.done else report
-    return Repaired(tuple(mending.done), replace(report, findings=(*report.findings, *mending.refused)))
+    return _Repaired(tuple(mending.done), replace(report, findings=(*report.findings, *mending.refused)))
 
 
 class _Mending:

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 MEGABYTE = 1e6
 
 
-class Action(StrEnum):
+class _Action(StrEnum):
     """The work of the command."""
 
     INFO, PRUNE, CLEAR = "info", "prune", "clear"
@@ -26,8 +26,8 @@ class Action(StrEnum):
 
 def cache(
     action: Annotated[
-        Action, typer.Argument(help="`info`; `prune` deletes the least recently used entries; `clear` deletes all entries.")
-    ] = Action.INFO,
+        _Action, typer.Argument(help="`info`; `prune` deletes the least recently used entries; `clear` deletes all entries.")
+    ] = _Action.INFO,
     to: Annotated[
         str | None,
         typer.Option(help="With prune: the size to keep, such as 500MB; default: CACHE_LIMIT.", show_default=False),
@@ -42,18 +42,18 @@ def cache(
     from viewsphere.caches import KINDS, budget, cache_folder
     from viewsphere.limits import limits
 
-    if to is not None and action != Action.PRUNE:
+    if to is not None and action != _Action.PRUNE:
         raise UserError("cache: --to is for `cache prune`")
-    if kind and action != Action.CLEAR:
+    if kind and action != _Action.CLEAR:
         raise UserError("cache: --kind is for `cache clear`")
     for name in kind or ():
         if name not in KINDS:
             raise UserError(f"cache: --kind {name!r:.60} is unknown. Valid: {', '.join(KINDS)}")
-    if action == Action.INFO:
+    if action == _Action.INFO:
         held = {"folder": str(cache_folder()), "limit": limits.CACHE_LIMIT, "kinds": _by_kind(budget.entries())}
         print_json(held) if json_ else _tell(held)
         return
-    if action == Action.CLEAR:
+    if action == _Action.CLEAR:
         gone = budget.clear(kind or tuple(KINDS))
     else:
         gone = budget.prune(limits.CACHE_LIMIT if to is None else _bytes(to))

@@ -56,7 +56,7 @@ def doctor(
 
             raise UserError(f"--setup: {one_of(name, tuple(downloads))}{'; ' if gap() else ''}{gap()}")
         downloads[name].fetch(lambda line: say(line, err=True))
-    facts = examine()
+    facts = _examine()
     if json_:
         print_json(facts)
         return
@@ -64,7 +64,7 @@ def doctor(
         say(f"{name:{LEFT}} {value}")
 
 
-def examine() -> dict[str, Any]:
+def _examine() -> dict[str, Any]:
     """The findings about this machine, as plain data."""
     return {
         "viewsphere": version("viewsphere"),

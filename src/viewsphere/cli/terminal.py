@@ -64,13 +64,13 @@ def complain(error: ViewsphereError, status: int) -> None:
 
 def write_picture(file: Path, picture: Any) -> None:
     """Write (H, W, 3) uint8 as PNG; UserError for a file of another ending."""
-    check_picture(file)
+    _check_picture(file)
     from viewsphere.codecs.png_tiff import encode_png
 
     write_whole(file, encode_png(picture))
 
 
-def check_picture(file: Path) -> None:
+def _check_picture(file: Path) -> None:
     """Raise UserError for a file name without the ending of a PNG."""
     if file.suffix.lower() != ".png":
         raise UserError(f"--output: expected a picture that ends in .png; found {file}: {file.with_suffix('.png')}?")

@@ -36,7 +36,7 @@ NEAREST = 1e9
 
 
 @dataclass(frozen=True, eq=False)
-class Shape:
+class _Shape:
     """A model: vertices (N, 3) in its axes, metres; triangles (M, 3); and which vertices (N,) are corners."""
 
     vertices: Float
@@ -45,7 +45,7 @@ class Shape:
 
 
 @lru_cache(maxsize=64)
-def shape_of(shown: tuple[ModelSpec, TimeStep | None]) -> Shape:
+def shape_of(shown: tuple[ModelSpec, TimeStep | None]) -> _Shape:
     """The shape of a model at a time step; the last results are cached. Raises ModelError if its file cannot be used."""
     from viewsphere.assets.cache import load_normalised  # which loads readers of models
 
@@ -53,7 +53,7 @@ def shape_of(shown: tuple[ModelSpec, TimeStep | None]) -> Shape:
     mesh = load_normalised(spec, step=step)
     is_used = np.zeros(len(mesh.vertices), np.bool_)
     is_used[mesh.triangles] = True
-    return Shape(mesh.vertices.astype(np.float64), mesh.triangles, is_used)
+    return _Shape(mesh.vertices.astype(np.float64), mesh.triangles, is_used)
 
 
 def filled(shot: Shot, together: bool) -> Shot:
@@ -95,18 +95,18 @@ def _moved(now: Instant, view: Viewpoint, distance: float) -> Instant:
     return now.model_copy(update={"world_from_rig": there.world_from_rig, "viewpoint": there.viewpoint})
 
 
-def _placed(thing: Thing) -> Shape:
+def _placed(thing: Thing) -> _Shape:
     """A thing's shape, in the world."""
     shape = shape_of((thing.model, thing.step))
-    return Shape(transform(np.array(thing.world_from_object), shape.vertices), shape.triangles, shape.is_used)
+    return _Shape(transform(np.array(thing.world_from_object), shape.vertices), shape.triangles, shape.is_used)
 
 
-def _reach(placed: Sequence[Shape], now: Instant) -> float:
+def _reach(placed: Sequence[_Shape], now: Instant) -> float:
     """Metres from the camera's target to the farthest vertex."""
     return max(float(np.linalg.norm(shape.vertices - np.array(now.focus), axis=1).max()) for shape in placed) or 1.0
 
 
-def _share_filled(camera: Camera, placed: Sequence[Shape]) -> float:
+def _share_filled(camera: Camera, placed: Sequence[_Shape]) -> float:
     """The larger of box width / picture width and box height / picture height, for the box around all shapes (in world axes) as
     the camera projects them, as in the label `box2d_unclipped`. Infinite if the lens does not show all of them.
     """

@@ -15,7 +15,7 @@ WAVES = 6
 
 
 @dataclass(frozen=True, eq=False)
-class Noise:
+class _Noise:
     """Sums of sinusoids of equal size: their frequencies (D, WAVES), hertz, and phases (D, WAVES), radians."""
 
     frequencies: Float
@@ -27,10 +27,10 @@ class Noise:
         return np.array([_sum(frequencies, phases, seconds) for frequencies, phases in rows])
 
 
-def noise(rng: np.random.Generator, components: int, highest_hz: float) -> Noise:
+def noise(rng: np.random.Generator, components: int, highest_hz: float) -> _Noise:
     """Noise of independent components; each of WAVES equal bands up to the highest frequency contains one frequency."""
     draws = rng.random((components, 2, WAVES))
-    return Noise((np.arange(WAVES) + draws[:, 0]) * (highest_hz / WAVES), draws[:, 1] * (2 * math.pi))
+    return _Noise((np.arange(WAVES) + draws[:, 0]) * (highest_hz / WAVES), draws[:, 1] * (2 * math.pi))
 
 
 def _sum(frequencies: list[float], phases: list[float], seconds: float) -> float:

@@ -37,7 +37,7 @@ from viewsphere.store import Dataset
 KINDS = (".png", ".jpg")
 
 
-class CocoPanoptic(Tree):
+class _CocoPanoptic(Tree):
     """The tree of COCO's panoptic task."""
 
     def __init__(self, dataset: Dataset) -> None:
@@ -102,7 +102,7 @@ def _category(number: int, one: SemanticClass, supers: Mapping[int, str]) -> dic
     return {"id": number, "name": one.name, "supercategory": own, "isthing": int(one.is_thing), "color": list(one.color)}
 
 
-preparer, writer, verify = functions(CocoPanoptic)
+preparer, writer, verify = functions(_CocoPanoptic)
 
 
 FORMAT = FormatSpec(

@@ -48,7 +48,7 @@ STATES = (0, 1)
 """States of points in the picture: visible, occluded."""
 
 
-class FiftyOne(Tree):
+class _FiftyOne(Tree):
     """The tree of a data set."""
 
     def __init__(self, dataset: Dataset) -> None:
@@ -165,7 +165,7 @@ def _within(o: ObjectAnnotation) -> NDArray[np.bool_] | None:
     return np.ascontiguousarray(mask[y0:y1, x0:x1]) if mask.any() else None
 
 
-preparer, writer, verify = functions(FiftyOne)
+preparer, writer, verify = functions(_FiftyOne)
 
 
 FORMAT = FormatSpec(

@@ -61,7 +61,7 @@ SOURCES: dict[str, str] = {
 }  # fmt: skip
 
 
-class Options(Frozen):
+class _Options(Frozen):
     """The contents of the containers."""
 
     keys: tuple[Key, ...] = Field(
@@ -76,21 +76,21 @@ def _check() -> None:
     _library()
 
 
-def _needs(options: Options) -> tuple[str, ...]:
+def _needs(options: _Options) -> tuple[str, ...]:
     """The channels of these keys."""
     return tuple(SOURCES[key] for key in options.keys)
 
 
-def _refuses(scope: Scope, options: Options) -> Iterator[str]:
+def _refuses(scope: Scope, options: _Options) -> Iterator[str]:
     """Reasons to refuse: flow of still pictures."""
     if any("flow" in key for key in options.keys):
         yield from sequences(scope)
 
 
-class Hdf5(Tree):
+class _Hdf5(Tree):
     """The tree of files with these keys."""
 
-    def __init__(self, dataset: Dataset, options: Options) -> None:
+    def __init__(self, dataset: Dataset, options: _Options) -> None:
         super().__init__(dataset)
         self._keys = tuple(dict.fromkeys(options.keys))
         most = {"class_segmaps": max((category.id for category in dataset.categories), default=0)}
@@ -178,14 +178,14 @@ def _library() -> Any:
     return h5py
 
 
-preparer, writer, verify = functions(Hdf5)
+preparer, writer, verify = functions(_Hdf5)
 
 
 FORMAT = FormatSpec(
     about=__doc__,
     holds=("pictures", "depth", "normals", "masks", "NOCS", "flow", "poses", "cameras"),
     read_by=("h5py", "BlenderProc"),
-    options=Options,
+    options=_Options,
     names_credits=False,
     needs=_needs,
     refuses=_refuses,

@@ -55,7 +55,7 @@ def _refuses(scope: Scope) -> Iterator[str]:
     yield from other_cars(scope)
 
 
-class KittiOdometry(Tree):
+class _KittiOdometry(Tree):
     """The tree of the benchmark."""
 
     def __init__(self, dataset: Dataset) -> None:
@@ -93,7 +93,7 @@ def _pose(shot: Shot, instant: int, car: Car) -> Float:
     return compose(shot.instants[instant].world_from_rig, mounted(shot.rig, car.left))
 
 
-preparer, writer, verify = functions(KittiOdometry)
+preparer, writer, verify = functions(_KittiOdometry)
 
 
 FORMAT = FormatSpec(

@@ -55,7 +55,7 @@ def refuses(scope: Scope, options: Options) -> Iterator[str]:
     yield from plain_names(scope, r"\S([^\r\n]*\S)?", "of one line, without spaces at its ends")
 
 
-class Mot(Tree):
+class _Mot(Tree):
     """The tree of these boxes."""
 
     def __init__(self, dataset: Dataset, options: Options) -> None:
@@ -104,7 +104,7 @@ def _columns(sample: Sample, o: ObjectAnnotation, x0: float, y0: float, x1: floa
     return (sample.instant + 1, o.id, *box, 1, o.category_id, f"{o.visibility:.10g}")
 
 
-preparer, writer, verify = functions(Mot)
+preparer, writer, verify = functions(_Mot)
 
 
 FORMAT = FormatSpec(

@@ -67,7 +67,7 @@ HEADS = {
 }
 
 
-class Options(Frozen):
+class _Options(Frozen):
     """The position of the world's origin on the globe."""
 
     latitude: float = Field(default=40.7142, ge=-90, le=90, description="degrees north (default: New York)")
@@ -75,7 +75,7 @@ class Options(Frozen):
     altitude: float = Field(default=0.0, ge=-1e5, le=1e5, description="metres above the ellipsoid")
 
 
-def _refuses(scope: Scope, options: Options) -> Iterator[str]:
+def _refuses(scope: Scope, options: _Options) -> Iterator[str]:
     """Reasons to refuse: cameras that Bundler cannot express."""
     yield from known_views(scope)
     yield from pinhole(scope)
@@ -86,10 +86,10 @@ def _refuses(scope: Scope, options: Options) -> Iterator[str]:
             yield f"expected square pixels and a centred camera; found K {lens.K.tolist()} of {name}"
 
 
-class Nyc3dCars(Tree):
+class _Nyc3dCars(Tree):
     """The tables and the pictures."""
 
-    def __init__(self, dataset: Dataset, options: Options) -> None:
+    def __init__(self, dataset: Dataset, options: _Options) -> None:
         super().__init__(dataset)
         self._types = {info.key: number for number, info in enumerate(dataset.models, 1)}
         at = math.radians(options.latitude), math.radians(options.longitude)
@@ -157,14 +157,14 @@ def _words(place: Float) -> str:
     return f"{math.degrees(longitude)!r} {math.degrees(latitude)!r} {altitude!r}"
 
 
-preparer, writer, verify = functions(Nyc3dCars)
+preparer, writer, verify = functions(_Nyc3dCars)
 
 
 FORMAT = FormatSpec(
     about=__doc__,
     holds=("boxes", "places on the globe", "footprints", "occlusion", "cameras"),
     read_by=("pandas", "PostGIS"),
-    options=Options,
+    options=_Options,
     channels=("rgb",),
     names_credits=False,
     refuses=_refuses,

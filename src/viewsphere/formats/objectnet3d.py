@@ -61,7 +61,7 @@ def _refuses(scope: Scope, options: Options) -> Iterator[str]:
     yield from no_viewpoints(scope)
 
 
-class ObjectNet3d(Tree):
+class _ObjectNet3d(Tree):
     """The tree of a release."""
 
     def __init__(self, dataset: Dataset, options: Options) -> None:
@@ -93,7 +93,7 @@ class ObjectNet3d(Tree):
         yield File("Image_sets/classes.txt", "".join(f"{name}\n" for name in names).encode())
 
 
-preparer, writer, verify = functions(ObjectNet3d)
+preparer, writer, verify = functions(_ObjectNet3d)
 
 
 FORMAT = FormatSpec(

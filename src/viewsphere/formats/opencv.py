@@ -47,7 +47,7 @@ def _refuses(scope: Scope) -> Iterator[str]:
     yield from opencv_lenses(scope)
 
 
-class Opencv(Tree):
+class _Opencv(Tree):
     """Files of cameras, pairs and pictures."""
 
     def __init__(self, dataset: Dataset) -> None:
@@ -137,7 +137,7 @@ def _yaml(values: dict[str, Value]) -> bytes:
     return ("\n".join(text) + "\n").encode()
 
 
-preparer, writer, verify = functions(Opencv)
+preparer, writer, verify = functions(_Opencv)
 
 
 FORMAT = FormatSpec(

@@ -64,7 +64,7 @@ def _word(name: str) -> str:
     return re.sub(r"[^A-Za-z0-9.]", "-", name)
 
 
-class RenderForCnn(Tree):
+class _RenderForCnn(Tree):
     """The tree of pictures and of their lists."""
 
     def __init__(self, dataset: Dataset) -> None:
@@ -132,7 +132,7 @@ def _truncation(seen: tuple[float, ...], whole: tuple[float, ...]) -> Iterator[f
         yield float((side - other) / size) if size else 0.0
 
 
-preparer, writer, verify = functions(RenderForCnn)
+preparer, writer, verify = functions(_RenderForCnn)
 
 
 FORMAT = FormatSpec(

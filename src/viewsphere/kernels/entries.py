@@ -43,7 +43,7 @@ def kernel_folder() -> Path:
     return cache_of("kernels")
 
 
-def folders() -> tuple[Path, ...]:
+def _folders() -> tuple[Path, ...]:
     """The folders in which entries are searched and written, with a temporary one if the first cannot be written."""
     first = kernel_folder()
     if _make(first):
@@ -53,7 +53,7 @@ def folders() -> tuple[Path, ...]:
 
 def load(name: str) -> bytes | None:
     """The content of the entry of this name, None if it is missing, incomplete or not trusted."""
-    for folder in (SHIPPED, *folders()):
+    for folder in (SHIPPED, *_folders()):
         data = _read(folder, name)
         if data is not None and hashlib.sha256(data[_DIGEST:]).digest() == data[:_DIGEST]:
             if folder != SHIPPED:
@@ -66,7 +66,7 @@ def save(name: str, content: bytes) -> None:
     """Store an entry if possible. Other processes see it completely or not at all, even if several write it at once."""
     packed = zlib.compress(content, _LEVEL)
     data = hashlib.sha256(packed).digest() + packed
-    for folder in folders():
+    for folder in _folders():
         if _make(folder) and _make((folder / name).parent):
             with suppress(OSError):  # full
                 _write(folder / name, data)
@@ -75,7 +75,7 @@ def save(name: str, content: bytes) -> None:
 
 def has(name: str) -> bool:
     """True if an entry of this name, complete or damaged, is in a folder that `load` searches."""
-    return any(_is_trusted(folder, name) and os.access(folder / name, os.R_OK) for folder in (SHIPPED, *folders()))
+    return any(_is_trusted(folder, name) and os.access(folder / name, os.R_OK) for folder in (SHIPPED, *_folders()))
 
 
 def _is_private(about: os.stat_result) -> bool:

@@ -81,7 +81,7 @@ Rng = np.random.Generator
 Sentences = Iterator[Caption]
 
 
-class Captions(Frozen):
+class _Captions(Frozen):
     """Options of the label."""
 
     count: Annotated[Count, Limits(le=MOST)] = Limits(default=5, description="sentences about each picture, at most")
@@ -130,7 +130,11 @@ class _Seen:
 
 def _compute(context: LabelContext, objects: Sequence[ObjectAnnotation]) -> Mapping[str, Any]:
     """The sentences of a picture; none for a LiDAR's."""
-    options, scenery, names = context.options_of("captions", Captions), context.get(ShotAppearance()), context.get(Randomness())
+    options, scenery, names = (
+        context.options_of("captions", _Captions),
+        context.get(ShotAppearance()),
+        context.get(Randomness()),
+    )
     if scenery is None or names is None:
         raise ValueError("captions: expected a sample of a shot, found none")
     if scenery.sensor.lidar is not None:
@@ -140,7 +144,7 @@ def _compute(context: LabelContext, objects: Sequence[ObjectAnnotation]) -> Mapp
     return {"captions": tuple(found)}
 
 
-def _seen(context: LabelContext, scenery: Scenery, objects: Sequence[ObjectAnnotation], options: Captions) -> _Seen:
+def _seen(context: LabelContext, scenery: Scenery, objects: Sequence[ObjectAnnotation], options: _Captions) -> _Seen:
     told = [o for o in objects if is_told(o, options.min_visibility)]
     fronts = frozenset(o.id for o in told if has_front(context.placement(o.id - 1).facts))
     weather, sun_is_low = _weather(scenery)
@@ -241,7 +245,7 @@ def _of_surroundings(seen: _Seen, rng: Rng) -> Sentences:
 FORMS = (*map(_of_one, ONE), _relations, _of_sky, _of_surroundings)
 
 
-def _by_templates(seen: _Seen, options: Captions, rng: Rng) -> list[Caption]:
+def _by_templates(seen: _Seen, options: _Captions, rng: Rng) -> list[Caption]:
     """The user's sentences, filled in."""
     found, waiting = list[Caption](), {template: _filled(template, seen, rng) for template in options.templates}
     while waiting and len(found) < options.count:
@@ -312,7 +316,7 @@ def _prove(sample: Sample, models: Models) -> Iterator[str]:
     are checked if the sample has `looks`.
     """
     visible = {o.id: o for o in sample.objects if o.box2d is not None}
-    options = Captions.model_validate(sample.options.get("captions", {}))
+    options = _Captions.model_validate(sample.options.get("captions", {}))
     told = [o for o in visible.values() if is_told(o, options.min_visibility)]
     texts = [one.text for one in sample.captions]
     if len(set(texts)) < len(texts):
@@ -336,7 +340,7 @@ LABEL = SampleLabel(
     name="captions",
     meaning="sentences about the picture",
     needs=(Randomness(), ShotAppearance()),
-    options=Captions,
+    options=_Captions,
     names_categories=True,
     fields=(
         Field(

@@ -30,7 +30,7 @@ STEPS = 35130.0
 """Depth in centimetres times disparity in steps, for a Kinect: a step is an eighth of a pixel."""
 
 
-class Options(Frozen):
+class _Options(Frozen):
     """Options of the label depth_sensor."""
 
     kind: Literal["kinect", "stereo"] = Limits(
@@ -64,7 +64,7 @@ def _compute(context: LabelContext) -> NDArray[np.float32]:
     axial and lateral noise. J. Barron, J. Malik, Intrinsic Scene Properties from a Single RGB-D Image, CVPR 2013: steps. A
     point is a hole if something in its row hides it from the projector or the second camera.
     """
-    options, names = context.options_of("depth_sensor", Options), context.get(Randomness())
+    options, names = context.options_of("depth_sensor", _Options), context.get(Randomness())
     if names is None:
         raise ValueError("depth_sensor: expected a sample of a shot, found none")
     shape = context.visibility.triangle.shape
@@ -112,7 +112,7 @@ def _shadow(depth: Float, reach: float) -> NDArray[np.bool_]:
     return hidden
 
 
-def _kinect(depth: Float, angle: Float, focal: float, options: Options, draw: Draw) -> Float:
+def _kinect(depth: Float, angle: Float, focal: float, options: _Options, draw: Draw) -> Float:
     """Depth, read from a neighbouring place (lateral noise), with axial noise, in steps of the disparity."""
     flat = np.minimum(angle, math.radians(89.0))
     lean = flat / (math.pi / 2 - flat)
@@ -132,7 +132,7 @@ def _kinect(depth: Float, angle: Float, focal: float, options: Options, draw: Dr
         return np.where(np.isfinite(moved) & (steps >= 1), STEPS / np.maximum(steps, 1.0) / 100.0, np.inf)
 
 
-def _stereo(depth: Float, angle: Float, focal: float, options: Options, draw: Draw) -> Float:
+def _stereo(depth: Float, angle: Float, focal: float, options: _Options, draw: Draw) -> Float:
     """Depth from a disparity with matching noise, in steps of a fraction of a pixel."""
     step = 0.125 if options.step is None else options.step
     disparity = focal * options.baseline / depth + options.noise * draw("disparity")
@@ -168,7 +168,7 @@ LABEL = ChannelLabel(
     meaning="depth as a depth camera measures it, with noise, steps and holes",
     axes="camera",
     needs=(Randomness(),),
-    options=Options,
+    options=_Options,
     dtype=np.float32,
     unit="m",
     empty=np.inf,

@@ -37,7 +37,7 @@ NEAREST = 0.5
 """Maximum share of a point's distance by which surface may be in front of it."""
 
 
-class Options(Frozen):
+class _Options(Frozen):
     """Options of the label keypoints."""
 
     depth_slack: Annotated[Number, Limits(ge=0, le=0.5)] = Limits(
@@ -60,7 +60,7 @@ def _states(context: LabelContext) -> dict[int, tuple[int, ...]]:
 
     A point is tested at a place on its ray that is nearer to the camera by the slack.
     """
-    view, slack = context.get(OwnView()), context.options_of("keypoints", Options).depth_slack
+    view, slack = context.get(OwnView()), context.options_of("keypoints", _Options).depth_slack
     if view is None:
         raise ValueError("keypoints: expected a sample of a shot, found none")
     found, places = dict[int, int](), list[Float]()
@@ -161,7 +161,7 @@ LABEL = ObjectLabel(
     meaning="its model's named points",
     on_request=True,
     needs=(OwnView(),),
-    options=Options,
+    options=_Options,
     fields=(
         Field("keypoint_names", "names of the points; the data set's models have skeletons and flips, too", str, many=True),
         Field("keypoints", f"{_EACH}; NaN without a pixel", float, (-1, 2), "px", "image", is_array=True),

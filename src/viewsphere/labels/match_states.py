@@ -20,7 +20,7 @@ MEANING = "0 visible, 1 occluded, 2 outside the picture, 3 behind the camera, 4 
 COLORS = np.array([(235, 235, 235), (200, 60, 50), (60, 110, 200), (120, 70, 160), (0, 0, 0)], np.uint8)
 
 
-def states(context: LabelContext, other: Next | Previous | Partner) -> NDArray[np.uint8]:
+def _states(context: LabelContext, other: Next | Previous | Partner) -> NDArray[np.uint8]:
     """The states of the seen points in another view, (H, W); all invalid without one."""
     match = context.match(other)
     return np.full(context.visibility.triangle.shape, INVALID, np.uint8) if match is None else match.state
@@ -58,7 +58,7 @@ def _label(name: str, where: str, other: Next | Previous | Partner) -> ChannelLa
         ids={},
         empty=4,
         encoding="png",
-        compute=lambda context: states(context, other),
+        compute=lambda context: _states(context, other),
         prove=prove,
         drawing=_drawing(name),
     )

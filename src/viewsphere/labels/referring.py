@@ -45,7 +45,7 @@ APART = 0.02
 EXTREMES = ("leftmost", "rightmost", "nearest", "farthest")
 
 
-class Referring(Frozen):
+class _Referring(Frozen):
     """Options of the label."""
 
     min_visibility: Portion = Limits(
@@ -186,7 +186,7 @@ def _used(own: Words) -> int:
 
 def _compute(context: LabelContext, objects: Sequence[ObjectAnnotation]) -> Mapping[str, Any]:
     """The expressions, in the order of the objects' ids; none for a LiDAR's picture."""
-    options, scenery = context.options_of("referring", Referring), context.get(ShotAppearance())
+    options, scenery = context.options_of("referring", _Referring), context.get(ShotAppearance())
     if scenery is None:
         raise ValueError("referring: expected a sample of a shot, found none")
     if scenery.sensor.lidar is not None:
@@ -213,7 +213,7 @@ def _prove(sample: Sample, models: Models) -> Iterator[str]:
         if text != one.text:
             yield f"object {one.object}: expected {text!r}, by the parts of the expression; found {one.text!r:.80}"
     if "looks" in sample.requested and not sample.camera.lens.is_scan:
-        options = Referring.model_validate(sample.options.get("referring", {}))
+        options = _Referring.model_validate(sample.options.get("referring", {}))
         words = {o.id: (o.color or "", o.material or "") for o in visible}
         scene = Scene(visible, words, (sample.width, sample.height))
         kept = {one.object: one for one in sample.referring}
@@ -252,7 +252,7 @@ LABEL = SampleLabel(
     name="referring",
     meaning="expressions that single objects out",
     needs=(ShotAppearance(),),
-    options=Referring,
+    options=_Referring,
     names_categories=True,
     fields=(
         Field(

@@ -47,7 +47,7 @@ NaN behind the camera; and its state there: 0 visible, 1 occluded, 2 outside, 3 
 """
 
 
-class SurfaceSamples(Frozen):
+class _SurfaceSamples(Frozen):
     """Options of the label surface_samples."""
 
     count: Annotated[Count, Field(le=MOST)] = Field(default=1024, description="points on each object")
@@ -75,7 +75,7 @@ def _compute(context: LabelContext) -> NDArray[np.void]:
     own, draw = context.own_view, context.get(ObjectPoints())
     if own is None or draw is None:
         raise ValueError("surface_samples: expected a sample of a shot, found none")
-    points = draw(context.options_of("surface_samples", SurfaceSamples).count)
+    points = draw(context.options_of("surface_samples", _SurfaceSamples).count)
     now, g = points.in_view(own), own.geometry
     out = np.zeros(len(points), SURFACE_SAMPLE)
     start, ids = np.array(g.triangle_start), np.array([thing.id for thing in own.things], np.int32)
@@ -143,7 +143,7 @@ def _in_picture(sample: Sample, rows: Array) -> Iterator[str]:
         yield f"expected state {OUTSIDE} outside of the picture, {BEHIND} without a pixel; found others of {wrong.sum()} points"
 
 
-def draw(pen: ImageDraw, sample: Sample, scale: float) -> None:
+def _draw(pen: ImageDraw, sample: Sample, scale: float) -> None:
     """Every point that is seen, in its object's colour, with a short line along its normal."""
     rows, camera = sample.channels["surface_samples"], sample.camera
     size = {o.id: float(np.sqrt((Box3d(o.box3d_object).diagonal ** 2).sum())) for o in sample.objects}
@@ -163,7 +163,7 @@ LABEL = ChannelLabel(
     "whether it is seen",
     axes="object, world, image",
     needs=(ObjectPoints(),),
-    options=SurfaceSamples,
+    options=_SurfaceSamples,
     dtype=SURFACE_SAMPLE,
     components=0,
     unit="m, px",
@@ -172,5 +172,5 @@ LABEL = ChannelLabel(
     ids={"object": in_column("object"), "part": in_column("triangle")},
     compute=_compute,
     prove=_prove,
-    drawing=Drawing("surface_samples", lines=draw),
+    drawing=Drawing("surface_samples", lines=_draw),
 )

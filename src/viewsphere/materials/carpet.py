@@ -13,7 +13,7 @@ from viewsphere.plugins.material import MaterialSpec
 
 
 @dataclass(frozen=True)
-class Carpet:
+class _Carpet:
     """Linear colours of the yarn, and of flecks and lines; `tufts` over `metres`; pile in metres; flecks: share of other tufts.
 
     ordered: 1 for loops in rows, 0 for a shaggy pile; diamonds: how many a side, 0 for none.
@@ -30,9 +30,9 @@ class Carpet:
     seed: int = 0
 
 
-def _carpet(parameters: Carpet | None = None, size: int = 512) -> Surface:
+def _carpet(parameters: _Carpet | None = None, size: int = 512) -> Surface:
     """The pile: every tuft is lit on top and dark between, leans its own way, and footsteps brush whole patches aside."""
-    p = parameters or Carpet()
+    p = parameters or _Carpet()
     tufts = cells(size, p.tufts, p.seed, 1 - p.ordered)
     fibre = noise(size, 2 * p.tufts, p.seed + 1, 2, 0.8)
     brushed = noise(size, max(round(4 * p.metres), 2), p.seed + 2, 4, 0.5)
@@ -50,16 +50,16 @@ def _carpet(parameters: Carpet | None = None, size: int = 512) -> Surface:
 
 
 YARNS: tuple[Color, ...] = (
-    Carpet.color, (0.42, 0.38, 0.31), (0.20, 0.20, 0.205), (0.07, 0.10, 0.19), (0.10, 0.16, 0.11), (0.50, 0.47, 0.42),
+    _Carpet.color, (0.42, 0.38, 0.31), (0.20, 0.20, 0.205), (0.07, 0.10, 0.19), (0.10, 0.16, 0.11), (0.50, 0.47, 0.42),
     (0.17, 0.11, 0.075), (0.33, 0.20, 0.10), (0.12, 0.20, 0.24),
 )  # fmt: skip
 
 
-def _draw(rng: np.random.Generator) -> Carpet:
+def _draw(rng: np.random.Generator) -> _Carpet:
     """Loops or pile, plain, flecked or with diamonds."""
     color, fleck = (YARNS[int(i)] for i in rng.choice(len(YARNS), size=2, replace=False))
     metres = float(rng.uniform(0.5, 0.9))
-    return Carpet(
+    return _Carpet(
         color=color,
         fleck=fleck,
         tufts=round(metres / float(rng.uniform(0.0045, 0.008))),

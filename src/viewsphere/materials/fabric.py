@@ -15,7 +15,7 @@ from viewsphere.plugins.material import MaterialSpec
 
 
 @dataclass(frozen=True)
-class Fabric:
+class _Fabric:
     """`threads` over `metres`, a multiple of 16; linear colours of the threads and of those in stripes or checks, `stripes` of
     them; twill: threads cross over two at a time, shifted by one from row to row.
     """
@@ -31,9 +31,9 @@ class Fabric:
     seed: int = 0
 
 
-def _fabric(parameters: Fabric | None = None, size: int = 512) -> Surface:
+def _fabric(parameters: _Fabric | None = None, size: int = 512) -> Surface:
     """The cloth: every thread has its own tone and thickness, and goes over and under those across it."""
-    p = parameters or Fabric()
+    p = parameters or _Fabric()
     rng = np.random.default_rng(p.seed)
     at = ((np.arange(size, dtype=np.float32) + 0.5) / size) * p.threads
     wander = [0.3 * noise(size, max(p.threads // 4, 2), p.seed + k, 4, 0.6) for k in (0, 1)]
@@ -60,7 +60,7 @@ def _fabric(parameters: Fabric | None = None, size: int = 512) -> Surface:
     return Surface(color, np.clip(0.97 - 0.1 * swell, 0.5, 1).astype(np.float32), height.astype(np.float32), p.metres)
 
 
-def _second(p: Fabric, index: NDArray[np.int64], over: NDArray[np.bool_]) -> Map:
+def _second(p: _Fabric, index: NDArray[np.int64], over: NDArray[np.bool_]) -> Map:
     """1 where the thread on top has the second colour."""
     width = p.threads // (2 * p.stripes)
     striped = (index % p.threads // width) % 2 == 1
@@ -70,17 +70,17 @@ def _second(p: Fabric, index: NDArray[np.int64], over: NDArray[np.bool_]) -> Map
 
 
 DYES: tuple[Color, ...] = (
-    Fabric.color, (0.46, 0.43, 0.37), (0.24, 0.23, 0.22), (0.055, 0.055, 0.06), (0.30, 0.05, 0.05), (0.10, 0.20, 0.13),
+    _Fabric.color, (0.46, 0.43, 0.37), (0.24, 0.23, 0.22), (0.055, 0.055, 0.06), (0.30, 0.05, 0.05), (0.10, 0.20, 0.13),
     (0.50, 0.32, 0.10), (0.35, 0.24, 0.16), (0.16, 0.30, 0.36), (0.64, 0.62, 0.57), (0.42, 0.20, 0.24),
 )  # fmt: skip
 
 
-def _draw(rng: np.random.Generator) -> Fabric:
+def _draw(rng: np.random.Generator) -> _Fabric:
     """Of two dyes; plain more often than striped or checked."""
     color, other = (DYES[int(i)] for i in rng.choice(len(DYES), size=2, replace=False))
     pattern: tuple[Literal["plain", "stripes", "checks"], ...] = ("plain", "stripes", "checks")
     threads = int(rng.choice((64, 96, 128)))
-    return Fabric(
+    return _Fabric(
         color=color,
         other=other,
         pattern=pattern[int(rng.choice(3, p=(0.6, 0.2, 0.2)))],

@@ -13,7 +13,7 @@ from viewsphere.plugins.material import MaterialSpec
 
 
 @dataclass(frozen=True)
-class Leather:
+class _Leather:
     """Linear colour; the `pebble`'s size in metres, the depth of creases, the wear, 0 to 1, and the roughness."""
 
     color: Color = (0.21, 0.085, 0.04)
@@ -25,9 +25,9 @@ class Leather:
     seed: int = 0
 
 
-def _leather(parameters: Leather | None = None, size: int = 512) -> Surface:
+def _leather(parameters: _Leather | None = None, size: int = 512) -> Surface:
     """The hide: creases are the borders of cells of three sizes, fewer of the large ones."""
-    p = parameters or Leather()
+    p = parameters or _Leather()
     count = max(round(p.metres / p.pebble), 4)
     pebbles, small = cells(size, count, p.seed), cells(size, (2 * count, 2 * count - 1), p.seed + 1)
     large = cells(size, max(count // 6, 2), p.seed + 2)
@@ -48,15 +48,15 @@ def _leather(parameters: Leather | None = None, size: int = 512) -> Surface:
 
 
 HIDES: tuple[Color, ...] = (
-    Leather.color, (0.035, 0.033, 0.032), (0.34, 0.17, 0.075), (0.10, 0.05, 0.03), (0.20, 0.03, 0.028), (0.56, 0.50, 0.40),
+    _Leather.color, (0.035, 0.033, 0.032), (0.34, 0.17, 0.075), (0.10, 0.05, 0.03), (0.20, 0.03, 0.028), (0.56, 0.50, 0.40),
     (0.06, 0.09, 0.065), (0.05, 0.065, 0.11),
 )  # fmt: skip
 
 
-def _draw(rng: np.random.Generator) -> Leather:
+def _draw(rng: np.random.Generator) -> _Leather:
     """Brown, black, tan, red, cream, ..., smooth to pebbled."""
     metres = float(rng.uniform(0.15, 0.3))
-    return Leather(
+    return _Leather(
         color=times(HIDES[int(rng.integers(len(HIDES)))], float(rng.uniform(0.8, 1.2))),
         pebble=float(rng.uniform(0.0022, 0.0045)),
         creases=float(rng.uniform(0.3, 1.0)),

@@ -13,7 +13,7 @@ from viewsphere.plugins.material import MaterialSpec
 
 
 @dataclass(frozen=True)
-class Marble:
+class _Marble:
     """Linear colours of the stone, its clouds and its veins; `veins`: their amount and darkness, 0 to 1."""
 
     color: Color = (0.74, 0.73, 0.71)
@@ -25,9 +25,9 @@ class Marble:
     seed: int = 0
 
 
-def _marble(parameters: Marble | None = None, size: int = 512) -> Surface:
+def _marble(parameters: _Marble | None = None, size: int = 512) -> Surface:
     """The stone: veins are where warped noise changes its sign, broad and faint ones below thin and dark ones."""
-    p = parameters or Marble()
+    p = parameters or _Marble()
     clouds, patches = noise(size, 3, p.seed, 7, 0.55), noise(size, 3, p.seed + 1, 4)
     first = np.abs(noise(size, (2, 3), p.seed + 2, 7, 0.52) + 0.3 * clouds)
     second = np.abs(noise(size, (4, 3), p.seed + 3, 7, 0.5) + 0.4 * patches)
@@ -49,7 +49,7 @@ def _line(distance: Map, width: float) -> Map:
 
 
 STONES: tuple[tuple[Color, Color, Color], ...] = (
-    (Marble.color, Marble.cloud, Marble.vein),
+    (_Marble.color, _Marble.cloud, _Marble.vein),
     ((0.68, 0.60, 0.48), (0.56, 0.46, 0.34), (0.36, 0.21, 0.11)),
     ((0.035, 0.035, 0.038), (0.075, 0.075, 0.08), (0.55, 0.54, 0.50)),
     ((0.07, 0.13, 0.095), (0.12, 0.22, 0.16), (0.48, 0.52, 0.46)),
@@ -58,11 +58,11 @@ STONES: tuple[tuple[Color, Color, Color], ...] = (
 )
 
 
-def _draw(rng: np.random.Generator) -> Marble:
+def _draw(rng: np.random.Generator) -> _Marble:
     """White, cream, black, green, red or grey."""
     color, cloud, vein = STONES[int(rng.choice(len(STONES), p=(0.35, 0.2, 0.15, 0.1, 0.1, 0.1)))]
     light = float(rng.uniform(0.85, 1.08))
-    return Marble(
+    return _Marble(
         color=times(color, light),
         cloud=times(cloud, light),
         vein=vein,

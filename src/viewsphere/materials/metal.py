@@ -12,7 +12,7 @@ from viewsphere.plugins.material import MaterialSpec
 
 
 @dataclass(frozen=True)
-class Metal:
+class _Metal:
     """Linear colour of reflections; roughness; strength of brushing, dents and tarnish, 0 to 1."""
 
     color: Color = (0.56, 0.57, 0.58)
@@ -24,9 +24,9 @@ class Metal:
     seed: int = 0
 
 
-def _metal(parameters: Metal | None = None, size: int = 512) -> Surface:
+def _metal(parameters: _Metal | None = None, size: int = 512) -> Surface:
     """The sheet, brushed along u."""
-    p = parameters or Metal()
+    p = parameters or _Metal()
     lines = noise(size, (2, 125), p.seed, 2, 0.8) + 0.5 * noise(size, (7, 170), p.seed + 1)
     blots = noise(size, 3, p.seed + 2, 6, 0.6)
     bumps = noise(size, 9, p.seed + 3, 3, 0.5)
@@ -40,16 +40,16 @@ def _metal(parameters: Metal | None = None, size: int = 512) -> Surface:
 
 
 METALS: tuple[Color, ...] = (
-    Metal.color, (0.91, 0.92, 0.92), (0.95, 0.93, 0.88), (0.955, 0.638, 0.538), (1.0, 0.766, 0.336), (0.55, 0.556, 0.554),
+    _Metal.color, (0.91, 0.92, 0.92), (0.95, 0.93, 0.88), (0.955, 0.638, 0.538), (1.0, 0.766, 0.336), (0.55, 0.556, 0.554),
     (0.91, 0.78, 0.42), (0.26, 0.255, 0.25),
 )  # fmt: skip
 
 
-def _draw(rng: np.random.Generator) -> Metal:
+def _draw(rng: np.random.Generator) -> _Metal:
     """Steel, aluminium, silver, copper, gold, chrome, brass, iron (reflectances: Hoffman, SIGGRAPH 2010), polished to dull."""
     r, g, b = METALS[int(rng.integers(len(METALS)))]
     light = float(rng.uniform(0.7, 1.0))
-    return Metal(
+    return _Metal(
         color=(r * light, g * light, b * light),
         finish=float(rng.uniform(0.12, 0.55)),
         brushed=float(rng.choice((0.1, rng.uniform(0.4, 1.0)))),

@@ -13,7 +13,7 @@ from viewsphere.plugins.material import MaterialSpec
 
 
 @dataclass(frozen=True)
-class Sand:
+class _Sand:
     """Linear colour; number of `ripples` over `metres`, and their height in metres; pebbles: their amount, 0 to 1."""
 
     color: Color = (0.45, 0.335, 0.195)
@@ -24,9 +24,9 @@ class Sand:
     seed: int = 0
 
 
-def _sand(parameters: Sand | None = None, size: int = 512) -> Surface:
+def _sand(parameters: _Sand | None = None, size: int = 512) -> Surface:
     """The ground: ripples are gentle to windward and steep to lee, and end and fork as they run."""
-    p = parameters or Sand()
+    p = parameters or _Sand()
     bend = noise(size, 3, p.seed, 4, 0.42)
     calm = noise(size, 2, p.seed + 1, 3)
     grains = noise(size, max(round(p.metres / 0.005), 2), p.seed + 2, 2, 0.8)
@@ -44,13 +44,13 @@ def _sand(parameters: Sand | None = None, size: int = 512) -> Surface:
     return Surface(shaded(color, np.ones_like(shade)), np.full_like(shade, 0.95), height.astype(np.float32), p.metres)
 
 
-SANDS: tuple[Color, ...] = (Sand.color, (0.60, 0.53, 0.40), (0.42, 0.24, 0.11), (0.26, 0.22, 0.17), (0.50, 0.47, 0.42))
+SANDS: tuple[Color, ...] = (_Sand.color, (0.60, 0.53, 0.40), (0.42, 0.24, 0.11), (0.26, 0.22, 0.17), (0.50, 0.47, 0.42))
 
 
-def _draw(rng: np.random.Generator) -> Sand:
+def _draw(rng: np.random.Generator) -> _Sand:
     """Of beaches, deserts and building sites; rippled or trodden flat."""
     metres = float(rng.uniform(1.2, 2.0))
-    return Sand(
+    return _Sand(
         color=times(SANDS[int(rng.integers(len(SANDS)))], float(rng.uniform(0.8, 1.15))),
         ripples=round(metres / float(rng.uniform(0.08, 0.18))),
         high=float(rng.choice((0.0, rng.uniform(0.004, 0.012)))),

@@ -14,7 +14,7 @@ from viewsphere.plugins.material import MaterialSpec
 
 
 @dataclass(frozen=True)
-class Stone:
+class _Stone:
     """`rows` of blocks over `metres`, `columns` in each; linear colours of the darkest, the usual and the lightest block,
     and of the mortar; `joint` in metres; rough: how far faces stand out, 0 to 1.
     """
@@ -29,9 +29,9 @@ class Stone:
     seed: int = 0
 
 
-def _stone(parameters: Stone | None = None, size: int = 512) -> Surface:
+def _stone(parameters: _Stone | None = None, size: int = 512) -> Surface:
     """The wall: courses of uneven height, ragged edges, faces broken into facets, speckles of the stone's minerals."""
-    p = parameters or Stone()
+    p = parameters or _Stone()
     rng = np.random.default_rng(p.seed)
     heights = 0.65 + 0.7 * rng.random(p.rows)
     rows = np.concatenate([[0.0], np.cumsum(heights) / heights.sum()])
@@ -59,7 +59,7 @@ def _stone(parameters: Stone | None = None, size: int = 512) -> Surface:
 
 
 QUARRIES: tuple[tuple[Color, Color, Color], ...] = (
-    Stone.colors,
+    _Stone.colors,
     ((0.36, 0.29, 0.19), (0.50, 0.41, 0.28), (0.62, 0.53, 0.38)),
     ((0.12, 0.125, 0.13), (0.22, 0.225, 0.23), (0.34, 0.34, 0.34)),
     ((0.24, 0.12, 0.08), (0.36, 0.20, 0.14), (0.46, 0.29, 0.21)),
@@ -67,10 +67,10 @@ QUARRIES: tuple[tuple[Color, Color, Color], ...] = (
 )
 
 
-def _draw(rng: np.random.Generator) -> Stone:
+def _draw(rng: np.random.Generator) -> _Stone:
     """Limestone, sandstone, slate, granite."""
     colors = QUARRIES[int(rng.integers(len(QUARRIES)))]
-    return Stone(
+    return _Stone(
         colors=colors,
         mortar=times(colors[1], (float(rng.uniform(0.7, 1.2)),) * 3),
         rows=int(rng.integers(4, 10)),

@@ -13,7 +13,7 @@ from viewsphere.plugins.material import MaterialSpec
 
 
 @dataclass(frozen=True)
-class Water:
+class _Water:
     """Linear colours of deep water and of crests; metres from trough to crest, and how many of the longest waves there are over
     `metres`; foam: 0 to 1.
     """
@@ -27,9 +27,9 @@ class Water:
     seed: int = 0
 
 
-def _water(parameters: Water | None = None, size: int = 512) -> Surface:
+def _water(parameters: _Water | None = None, size: int = 512) -> Surface:
     """The surface: sums of waves that run within a quarter turn of the wind, sharpened to crests, bent by noise."""
-    p = parameters or Water()
+    p = parameters or _Water()
     sea = _sea(size, p)
     foamy = smooth(0.5, 0.9, sea + 0.5 * noise(size, 24, p.seed + 5, 5, 0.7) - 0.35 * (1 - p.foam)) * p.foam
     color = mixed(mixed(p.deep, p.crest, smooth(0.1, 1.0, sea)), (0.7, 0.72, 0.72), foamy)
@@ -37,7 +37,7 @@ def _water(parameters: Water | None = None, size: int = 512) -> Surface:
     return Surface(shaded(color, np.ones_like(sea)), np.clip(rough, 0.03, 1), p.high * sea, p.metres)
 
 
-def _sea(size: int, p: Water) -> Map:
+def _sea(size: int, p: _Water) -> Map:
     """Waves of about 0 to 1, each with a whole number of lengths across and down the square."""
     rng = np.random.default_rng(p.seed)
     at = (np.arange(size, dtype=np.float32) + 0.5) / size
@@ -56,15 +56,15 @@ def _sea(size: int, p: Water) -> Map:
     return out / np.float32(total)
 
 
-SEAS: tuple[Color, ...] = (Water.deep, (0.02, 0.065, 0.05), (0.02, 0.04, 0.08), (0.06, 0.055, 0.035))
+SEAS: tuple[Color, ...] = (_Water.deep, (0.02, 0.065, 0.05), (0.02, 0.04, 0.08), (0.06, 0.055, 0.035))
 
 
-def _draw(rng: np.random.Generator) -> Water:
+def _draw(rng: np.random.Generator) -> _Water:
     """Ponds to a choppy sea, blue, green or brown."""
     deep = SEAS[int(rng.choice(len(SEAS), p=(0.4, 0.3, 0.2, 0.1)))]
     metres = float(rng.uniform(2.0, 6.0))
     r, g, b = deep
-    return Water(
+    return _Water(
         deep=deep,
         crest=(2.0 * r, 2.0 * g, 1.8 * b),
         high=metres * float(rng.uniform(0.008, 0.03)),

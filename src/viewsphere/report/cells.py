@@ -19,7 +19,7 @@ PER_DEGREE = 2
 
 
 @dataclass(frozen=True)
-class Cells:
+class _Cells:
     """Cells on the sphere: `azimuth` and `elevation` are (first edge, width) in degrees.
 
     `occupied` holds (column, row, frames): a cell spans the azimuths from first edge + column * width on, one width, and the
@@ -31,7 +31,7 @@ class Cells:
     occupied: tuple[tuple[int, int, int], ...]
 
 
-def sphere_cells(azimuth_deg: NDArray[np.floating], elevation_deg: NDArray[np.floating]) -> Cells:
+def sphere_cells(azimuth_deg: NDArray[np.floating], elevation_deg: NDArray[np.floating]) -> _Cells:
     """Count viewpoints in cells that fit them: centred on a grid's steps where they lie on one, else 10 degrees wide.
 
     So a regular grid fills its cells evenly, and the cells add no pattern of their own. Viewpoints that are NaN are left out.
@@ -48,7 +48,7 @@ def sphere_cells(azimuth_deg: NDArray[np.floating], elevation_deg: NDArray[np.fl
     cells, counts = np.unique(columns * height_in_rows + rows - lowest, return_counts=True)
     found = zip(*np.divmod(cells, height_in_rows), counts, strict=True)
     occupied = tuple((int(column), int(row + lowest), int(count)) for column, row, count in found)
-    return Cells((first_azimuth, width), (first_elevation, height), occupied)
+    return _Cells((first_azimuth, width), (first_elevation, height), occupied)
 
 
 def _edges(degrees: NDArray[np.float64], turn: float) -> tuple[float, float]:

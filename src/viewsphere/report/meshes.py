@@ -22,7 +22,7 @@ BISECTIONS = 12
 
 
 @dataclass(frozen=True, eq=False)
-class SmallMesh:
+class _SmallMesh:
     """vertices (V, 3) float64 metres, object axes; triangles (T, 3), and edges (E, 2) for parts thinner than the grid;
     colours (T, 3) and (E, 3) uint8 sRGB.
     """
@@ -34,7 +34,7 @@ class SmallMesh:
     edge_colors: NDArray[np.uint8]
 
 
-def read_small(glb: Path, most: int, node: str | None = None) -> SmallMesh:
+def read_small(glb: Path, most: int, node: str | None = None) -> _SmallMesh:
     """An exported model, reduced to at most `most` triangles and edges together; of a deforming model, the shape of one node.
 
     Raises ModelError like any reader of model files.
@@ -46,7 +46,7 @@ def read_small(glb: Path, most: int, node: str | None = None) -> SmallMesh:
     return simplified(vertices, mesh.triangles.astype(np.int64), _triangle_colors(mesh), most)
 
 
-def simplified(vertices: Float, triangles: NDArray[np.int64], colors: NDArray[np.uint8], most: int) -> SmallMesh:
+def simplified(vertices: Float, triangles: NDArray[np.int64], colors: NDArray[np.uint8], most: int) -> _SmallMesh:
     """At most `most` triangles and edges: unchanged if there are no more, else vertices that share a grid cell become one.
 
     The merged vertex lies where the sum of squared distances to the planes of the cell's triangles is least (Lindstrom,
@@ -54,7 +54,7 @@ def simplified(vertices: Float, triangles: NDArray[np.int64], colors: NDArray[np
     `most`.
     """
     if len(triangles) <= most:
-        return SmallMesh(vertices, triangles, colors, np.zeros((0, 2), np.int64), np.zeros((0, 3), np.uint8))
+        return _SmallMesh(vertices, triangles, colors, np.zeros((0, 2), np.int64), np.zeros((0, 3), np.uint8))
     low, high = vertices.min(axis=0), vertices.max(axis=0)
     extent = float((high - low).max())
     coarse, fine = extent / 4, extent / 4096
@@ -65,7 +65,7 @@ def simplified(vertices: Float, triangles: NDArray[np.int64], colors: NDArray[np
     cluster, corners = _cells(vertices, low, coarse)
     kept, edges, of_edge = _faces(cluster, triangles)
     points = _representatives(vertices, triangles, cluster, low + corners * coarse, coarse)
-    return SmallMesh(points, cluster[triangles[kept]], colors[kept], edges, colors[of_edge])
+    return _SmallMesh(points, cluster[triangles[kept]], colors[kept], edges, colors[of_edge])
 
 
 def _cells(vertices: Float, low: Float, cell: float) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
@@ -144,7 +144,7 @@ def _triangle_colors(mesh: Mesh) -> NDArray[np.uint8]:
     return np.clip(colors * 255, 0, 255).round().astype(np.uint8)
 
 
-def mesh_data(mesh: SmallMesh) -> dict[str, Any]:
+def mesh_data(mesh: _SmallMesh) -> dict[str, Any]:
     """The mesh for the page: 16-bit positions between `low` and `high`, and indices, as base64 of little-endian numbers."""
     used, index = np.unique(np.concatenate([mesh.triangles.ravel(), mesh.edges.ravel()]), return_inverse=True)
     points = mesh.vertices[used]

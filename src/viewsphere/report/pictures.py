@@ -146,14 +146,14 @@ def layers(sample: Sample, scale: Scale, within: Mapping[str, Extent] | None = N
 
 
 @dataclass(frozen=True)
-class Layer:
+class _Layer:
     """A small picture as lossy WebP, and the value range of its colours, if any."""
 
     webp: bytes
     range: tuple[float, float] | None = None
 
 
-Painter = Callable[[Sample, Scale, Mapping[str, Extent]], Layer]
+Painter = Callable[[Sample, Scale, Mapping[str, Extent]], _Layer]
 
 
 def layer_names(sample: Sample) -> list[str]:
@@ -166,16 +166,16 @@ def layer_names(sample: Sample) -> list[str]:
     return [name for name in PAINTERS if name in drawable]
 
 
-def layer(sample: Sample, name: str, scale: Scale, within: Mapping[str, Extent] | None = None) -> Layer:
+def layer(sample: Sample, name: str, scale: Scale, within: Mapping[str, Extent] | None = None) -> _Layer:
     """One of a sample's layers, by a name of `layer_names`."""
     return PAINTERS[name](sample, scale, within or {})
 
 
-def _rgb(sample: Sample, scale: Scale, within: Mapping[str, Extent]) -> Layer:
+def _rgb(sample: Sample, scale: Scale, within: Mapping[str, Extent]) -> _Layer:
     picture = (
         _shrunk(np.asarray(sample.picture, np.uint8), scale) if picture_of(sample.channels) else scan_picture(sample, scale)
     )
-    return Layer(webp(picture, scale.quality, method=1 if scale.quick else 4))
+    return _Layer(_webp(picture, scale.quality, method=1 if scale.quick else 4))
 
 
 SCAN = 640
@@ -206,74 +206,74 @@ def scan_picture(sample: Sample, scale: Scale) -> Picture:
     return np.vstack([strip, paint(sample, width)])
 
 
-def _depth(sample: Sample, scale: Scale, within: Mapping[str, Extent]) -> Layer:
+def _depth(sample: Sample, scale: Scale, within: Mapping[str, Extent]) -> _Layer:
     near, far, picture = depth_colors(_thinned(sample.channels["depth"], scale.layer_width))
-    return Layer(webp(picture, 75), (near, far))
+    return _Layer(_webp(picture, 75), (near, far))
 
 
-def _normals(sample: Sample, scale: Scale, within: Mapping[str, Extent]) -> Layer:
-    return Layer(webp(normal_colors(_thinned(sample.channels["normals"], scale.layer_width)), 75))
+def _normals(sample: Sample, scale: Scale, within: Mapping[str, Extent]) -> _Layer:
+    return _Layer(_webp(normal_colors(_thinned(sample.channels["normals"], scale.layer_width)), 75))
 
 
-def _coordinates(sample: Sample, scale: Scale, within: Mapping[str, Extent]) -> Layer:
+def _coordinates(sample: Sample, scale: Scale, within: Mapping[str, Extent]) -> _Layer:
     coordinates, instances = (_thinned(sample.channels[name], scale.layer_width) for name in ("coordinates", "instances"))
-    return Layer(webp(coordinate_colors(coordinates, instances, sample.objects), 75))
+    return _Layer(_webp(coordinate_colors(coordinates, instances, sample.objects), 75))
 
 
-def _parts(sample: Sample, scale: Scale, within: Mapping[str, Extent]) -> Layer:
-    return Layer(webp(_part_colors(_thinned(sample.channels["parts"], scale.layer_width)), 60))
+def _parts(sample: Sample, scale: Scale, within: Mapping[str, Extent]) -> _Layer:
+    return _Layer(_webp(_part_colors(_thinned(sample.channels["parts"], scale.layer_width)), 60))
 
 
-def _materials(sample: Sample, scale: Scale, within: Mapping[str, Extent]) -> Layer:
-    return Layer(webp(_part_colors(_thinned(sample.channels["materials"], scale.layer_width)), 60))
+def _materials(sample: Sample, scale: Scale, within: Mapping[str, Extent]) -> _Layer:
+    return _Layer(_webp(_part_colors(_thinned(sample.channels["materials"], scale.layer_width)), 60))
 
 
-def _body_parts(sample: Sample, scale: Scale, within: Mapping[str, Extent]) -> Layer:
-    return Layer(webp(_part_colors(_thinned(sample.channels["body_parts"], scale.layer_width)), 60))
+def _body_parts(sample: Sample, scale: Scale, within: Mapping[str, Extent]) -> _Layer:
+    return _Layer(_webp(_part_colors(_thinned(sample.channels["body_parts"], scale.layer_width)), 60))
 
 
 def _beside(name: str) -> Painter:
     """The painter of a channel that is shown as `preview` shows it, clear where it has no value."""
 
-    def paint(sample: Sample, scale: Scale, within: Mapping[str, Extent]) -> Layer:
+    def paint(sample: Sample, scale: Scale, within: Mapping[str, Extent]) -> _Layer:
         drawing, array = channel_labels()[name].drawing, sample.channels[name]
         picture = drawing and drawing.picture(sample)
         assert picture is not None
         known = np.isfinite(array) if array.ndim == 2 else np.isfinite(array[..., 0])
         thin, shown = _thinned(picture, scale.layer_width), _thinned(known, scale.layer_width)
-        return Layer(webp(_rgba(thin, shown), 75))
+        return _Layer(_webp(_rgba(thin, shown), 75))
 
     return paint
 
 
-def _flow(sample: Sample, scale: Scale, within: Mapping[str, Extent]) -> Layer:
+def _flow(sample: Sample, scale: Scale, within: Mapping[str, Extent]) -> _Layer:
     flow = sample.channels["flow"]
     longest = within["flow"][1] if "flow" in within else longest_of(flow)
     thin = _thinned(flow, scale.layer_width)
-    return Layer(webp(_rgba(flow_colors(thin, longest), np.isfinite(thin[..., 0])), 75), (0, longest))
+    return _Layer(_webp(_rgba(flow_colors(thin, longest), np.isfinite(thin[..., 0])), 75), (0, longest))
 
 
-def _disparity(sample: Sample, scale: Scale, within: Mapping[str, Extent]) -> Layer:
+def _disparity(sample: Sample, scale: Scale, within: Mapping[str, Extent]) -> _Layer:
     disparity = sample.channels["disparity"]
     far, near = within.get("disparity") or disparity_extent(disparity)
     thin = _thinned(disparity, scale.layer_width)
     known = np.isfinite(thin)
     share = np.clip((np.where(known, thin, far) - far) / max(near - far, 1e-9), 0, 1)
-    return Layer(webp(_rgba(_viridis(share), known), 75), (near, far))
+    return _Layer(_webp(_rgba(_viridis(share), known), 75), (near, far))
 
 
-def _flow_state(sample: Sample, scale: Scale, within: Mapping[str, Extent]) -> Layer:
+def _flow_state(sample: Sample, scale: Scale, within: Mapping[str, Extent]) -> _Layer:
     thin = _thinned(sample.channels["flow_state"], scale.layer_width)
-    return Layer(webp(_rgba(state_colors(thin), thin < 4), 60))
+    return _Layer(_webp(_rgba(state_colors(thin), thin < 4), 60))
 
 
-def _motion_boundaries(sample: Sample, scale: Scale, within: Mapping[str, Extent]) -> Layer:
+def _motion_boundaries(sample: Sample, scale: Scale, within: Mapping[str, Extent]) -> _Layer:
     lines = _widened(sample.channels["motion_boundaries"] > 0, scale.layer_width)
-    return Layer(webp(_rgba(np.full((*lines.shape, 3), BOUNDARY, np.uint8), lines), 60))
+    return _Layer(_webp(_rgba(np.full((*lines.shape, 3), BOUNDARY, np.uint8), lines), 60))
 
 
-def _pass(name: str, sample: Sample, scale: Scale, within: Mapping[str, Extent]) -> Layer:
-    return Layer(webp(pass_colors(name, _thinned(sample.channels[name], scale.layer_width)), 75))
+def _pass(name: str, sample: Sample, scale: Scale, within: Mapping[str, Extent]) -> _Layer:
+    return _Layer(_webp(pass_colors(name, _thinned(sample.channels[name], scale.layer_width)), 75))
 
 
 PAINTERS: dict[str, Painter] = {
@@ -304,7 +304,7 @@ def _widened(lines: NDArray[np.bool_], width: int) -> NDArray[np.bool_]:
     return np.asarray(Image.fromarray(lines.astype(np.uint8) * 255).resize(size, Image.Resampling.BOX)) > 0
 
 
-def webp(picture: Picture, quality: int, method: int = 4) -> bytes:
+def _webp(picture: Picture, quality: int, method: int = 4) -> bytes:
     """A picture (H, W, 3 or 4) uint8 as lossy WebP; a greater `method` takes longer for fewer bytes."""
     file = io.BytesIO()
     Image.fromarray(picture).save(file, "WEBP", quality=quality, method=method, alpha_quality=90)

@@ -188,7 +188,7 @@ class _Stopwatch:
 
 
 @dataclass(frozen=True)
-class Speed:
+class _Speed:
     """CPU milliseconds of a frame, and the speed of this machine relative to the reference."""
 
     frame_ms: float
@@ -202,7 +202,7 @@ def speed_recipe() -> Recipe:
     return Recipe.model_validate({"models": models, "viewpoints": viewpoints, "camera": {"size": [640, 480]}})
 
 
-def measure_speed() -> Speed | None:
+def measure_speed() -> _Speed | None:
     """The median over some frames without the first one; None if kernels would have to be compiled."""
     recipe = speed_recipe()
     if not is_precompiled(sketched(recipe)):
@@ -216,4 +216,4 @@ def measure_speed() -> Speed | None:
             break
         before = now
     frame_ms = 1000 * statistics.median(spent)
-    return Speed(frame_ms, REFERENCE_MS / frame_ms)
+    return _Speed(frame_ms, REFERENCE_MS / frame_ms)

@@ -17,7 +17,7 @@ from viewsphere.validation.errors import one_of
 
 
 @dataclass(frozen=True)
-class Made:
+class _Made:
     """A new recipe: its file, the numbers of its shots and models, and notes about it."""
 
     recipe: Path
@@ -26,7 +26,7 @@ class Made:
     notes: tuple[str, ...]
 
 
-def make_again(kind: str, source: Path, folder: Path) -> Made:
+def make_again(kind: str, source: Path, folder: Path) -> _Made:
     """Make a folder with a recipe that renders a data set again.
 
     The folder appears when it is complete and its recipe has been planned. Raises UserError for a format that cannot be
@@ -43,7 +43,7 @@ def make_again(kind: str, source: Path, folder: Path) -> Made:
         _make(found, f"{kind} {source}", folder)
     except OSError as error:
         raise UserError(f"{folder}: expected a place to write, found: {error.strerror or error}") from None
-    return Made(folder / RECIPE, len(found.shots), len(found.models), found.notes)
+    return _Made(folder / RECIPE, len(found.shots), len(found.models), found.notes)
 
 
 def _again() -> dict[str, Callable[[Path], SourceCameras]]:

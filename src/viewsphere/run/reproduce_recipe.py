@@ -113,7 +113,7 @@ def _joined(entries: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
     return list(found.values())
 
 
-def _shots(found: SourceCameras, substitute: StandIn | None) -> list[ListedShot]:
+def _shots(found: SourceCameras, substitute: _StandIn | None) -> list[ListedShot]:
     """The shots with unique names and valid split names; they show the stand-in if they have to be listed."""
     splits, names = dict[str, str](), dict[str, int]()
     shots: list[ListedShot] = []
@@ -152,7 +152,7 @@ def _free(name: str, names: dict[str, int]) -> str:
 
 
 def _recipe(
-    found: SourceCameras, entries: list[dict[str, Any]], shots: Sequence[ListedShot], substitute: StandIn | None
+    found: SourceCameras, entries: list[dict[str, Any]], shots: Sequence[ListedShot], substitute: _StandIn | None
 ) -> dict[str, Any]:
     views: dict[str, Any] = {"kind": "file", "path": SHOTS, "up": found.up}
     if substitute is not None:
@@ -202,7 +202,7 @@ def _line(shot: ListedShot, keys: dict[str, str]) -> dict[str, Any]:
     return shot.model_copy(update={"objects": objects}).model_dump(mode="json", exclude_defaults=True)
 
 
-def _text(data: dict[str, Any], of: str, found: SourceCameras, substitute: StandIn | None) -> str:
+def _text(data: dict[str, Any], of: str, found: SourceCameras, substitute: _StandIn | None) -> str:
     """The text of the recipe, with comments before its parts."""
     head = [
         f"Renders a data set again: {of}",
@@ -222,14 +222,14 @@ def _comment(lines: Sequence[str]) -> str:
 
 
 @dataclass(frozen=True)
-class StandIn:
+class _StandIn:
     """A model at `origin`, a point of the cameras' world, `length` metres from front to back."""
 
     origin: Vector
     length: float
 
 
-def stand_in(shots: Sequence[ListedShot]) -> StandIn:
+def stand_in(shots: Sequence[ListedShot]) -> _StandIn:
     """A model at the point nearest to all optical axes. If the axes are parallel, or meet behind or in a camera, it is ahead
     of the first camera. Its size suits half of the cameras, and no camera is inside it.
     """
@@ -246,7 +246,7 @@ def stand_in(shots: Sequence[ListedShot]) -> StandIn:
     sides = FILLED * float(np.median(distances)) * float(np.median(widths)), float(distances.min()), LONGEST * limits.MAX_SIZE
     length = min(sides)
     x, y, z = (round(value, 6) for value in origin.tolist())
-    return StandIn((x, y, z), max(SHORTEST, float(f"{length:.3g}")) if math.isfinite(length) else 1.0)
+    return _StandIn((x, y, z), max(SHORTEST, float(f"{length:.3g}")) if math.isfinite(length) else 1.0)
 
 
 def _ahead(centers: np.ndarray, axes: np.ndarray, point: np.ndarray) -> np.ndarray:

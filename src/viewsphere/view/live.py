@@ -53,7 +53,7 @@ MOST_FAILURES = 200
 
 
 @dataclass(frozen=True)
-class Shot:
+class _Shot:
     """A finished shot: its key, its first frame, its number of frames, its finish time, and whether it was remade."""
 
     key: str
@@ -106,7 +106,7 @@ class Live:
         self._workers = max(1, workers)
         self._plan_seen = self._plan_time()
         self._watch = Watch(self.dataset.store)
-        self._shots: list[Shot] = []
+        self._shots: list[_Shot] = []
         self._shots_read = 0
         self._frames, self._damaged = Rows(LISTED), Rows(np.dtype(np.bool_))
         self._columns = Columns()
@@ -221,7 +221,7 @@ class Live:
                 self._frames.extend(rows)
                 self._shots.append(shot)
 
-    def _news(self) -> Iterator[Shot]:
+    def _news(self) -> Iterator[_Shot]:
         """The new shots of the plan's own frames, without shots that add channels to older frames."""
         plan = self.dataset.plan
         for found in self._watch.news():
@@ -230,7 +230,7 @@ class Live:
                 plan = self.dataset.store.plan()
                 row = plan.find(found.key)
             if row is not None and row.part == plan.part_of(row.first):
-                yield Shot(found.key, row.first, row.count, found.made, found.again)
+                yield _Shot(found.key, row.first, row.count, found.made, found.again)
 
     def _read_columns(self) -> None:
         """Read the columns of all frames that have none, in the order of the list."""
@@ -244,7 +244,7 @@ class Live:
 
     def _read_elsewhere(self) -> None:
         """Read the columns in other processes, and check for new frames meanwhile."""
-        ahead: deque[tuple[Sequence[Shot], Future[list[FrameTable | str]]]] = deque()
+        ahead: deque[tuple[Sequence[_Shot], Future[list[FrameTable | str]]]] = deque()
         with ProcessPoolExecutor(self._workers, get_context("spawn"), _step_back) as pool:
             for piece in _pieces(self._shots[self._shots_read :]):
                 ahead.append((piece, pool.submit(_read, self.dataset.root, piece)))
@@ -256,13 +256,13 @@ class Live:
             while ahead:
                 self._take_first(ahead)
 
-    def _take_first(self, ahead: deque[tuple[Sequence[Shot], Future[list[FrameTable | str]]]]) -> None:
+    def _take_first(self, ahead: deque[tuple[Sequence[_Shot], Future[list[FrameTable | str]]]]) -> None:
         piece, future = ahead.popleft()
         self._take(piece, future.result())
         with suppress(OSError, ViewsphereError):
             self._list_news()
 
-    def _take(self, shots: Sequence[Shot], tables: Sequence[FrameTable | str]) -> None:
+    def _take(self, shots: Sequence[_Shot], tables: Sequence[FrameTable | str]) -> None:
         with self._lock:
             for shot, table in zip(shots, tables, strict=True):
                 if isinstance(table, str):
@@ -280,9 +280,9 @@ def _step_back() -> None:
         os.nice(10)
 
 
-def _pieces(shots: Sequence[Shot]) -> Iterator[Sequence[Shot]]:
+def _pieces(shots: Sequence[_Shot]) -> Iterator[Sequence[_Shot]]:
     """The shots in pieces of about `PIECE` frames."""
-    piece: list[Shot] = []
+    piece: list[_Shot] = []
     for shot in shots:
         piece.append(shot)
         if sum(s.count for s in piece) >= PIECE:
@@ -292,11 +292,11 @@ def _pieces(shots: Sequence[Shot]) -> Iterator[Sequence[Shot]]:
         yield piece
 
 
-def _read(root: Path, shots: Sequence[Shot]) -> list[FrameTable | str]:
+def _read(root: Path, shots: Sequence[_Shot]) -> list[FrameTable | str]:
     return _tables(Dataset(root), shots)
 
 
-def _tables(dataset: Dataset, shots: Sequence[Shot]) -> list[FrameTable | str]:
+def _tables(dataset: Dataset, shots: Sequence[_Shot]) -> list[FrameTable | str]:
     """The columns of each shot, or the reason why it cannot be read."""
     found: list[FrameTable | str] = []
     for shot in shots:

@@ -16,7 +16,7 @@ from viewsphere.view.live import Known
 
 
 @dataclass(frozen=True)
-class Measure:
+class _Measure:
     """A number to filter and sort by: its name, its unit, and the column of objects, or else of frames, that holds it."""
 
     words: str
@@ -26,17 +26,17 @@ class Measure:
 
 
 MEASURES = {
-    "visibility": Measure("Visible share", "%", "visibility", True),
-    "truncation": Measure("Truncated share", "%", "truncation", True),
-    "side": Measure("Size of the 2D box", "px", "side", True),
-    "distance": Measure("Distance", "m", "distance", True),
-    "azimuth": Measure("Azimuth it is seen from", "°", "azimuth", True),
-    "elevation": Measure("Elevation it is seen from", "°", "elevation", True),
-    "camera_azimuth": Measure("Camera's azimuth", "°", "azimuth", False),
-    "camera_elevation": Measure("Camera's elevation", "°", "elevation", False),
-    "camera_distance": Measure("Camera's distance", "m", "distance", False),
-    "objects": Measure("Objects", "", "objects", False),
-    "seen": Measure("Objects seen", "", "seen", False),
+    "visibility": _Measure("Visible share", "%", "visibility", True),
+    "truncation": _Measure("Truncated share", "%", "truncation", True),
+    "side": _Measure("Size of the 2D box", "px", "side", True),
+    "distance": _Measure("Distance", "m", "distance", True),
+    "azimuth": _Measure("Azimuth it is seen from", "°", "azimuth", True),
+    "elevation": _Measure("Elevation it is seen from", "°", "elevation", True),
+    "camera_azimuth": _Measure("Camera's azimuth", "°", "azimuth", False),
+    "camera_elevation": _Measure("Camera's elevation", "°", "elevation", False),
+    "camera_distance": _Measure("Camera's distance", "m", "distance", False),
+    "objects": _Measure("Objects", "", "objects", False),
+    "seen": _Measure("Objects seen", "", "seen", False),
 }
 """The measures by the names that a page uses."""
 
@@ -48,7 +48,7 @@ KNUTH = 2654435761
 
 
 @dataclass(frozen=True)
-class Within:
+class _Within:
     """A measure between two numbers, both inclusive; azimuths wrap around, from the first number up to the second."""
 
     measure: str
@@ -67,7 +67,7 @@ class Query:
     model: str = ""
     split: str = ""
     pose: str = ""
-    within: tuple[Within, ...] = ()
+    within: tuple[_Within, ...] = ()
     order: str = "frame"
 
     @property
@@ -109,7 +109,7 @@ class Query:
             return rows[_ordered(self.order, known.frames[: len(frames)][rows])]
         return rows[self._sorted(table, objects)[rows].argsort(kind="stable")]
 
-    def _of_frames(self, wanted: bool) -> tuple[Within, ...]:
+    def _of_frames(self, wanted: bool) -> tuple[_Within, ...]:
         return tuple(one for one in self.within if MEASURES[one.measure].is_of_object != wanted)
 
     def _objects(self, table: FrameTable) -> NDArray[np.bool_] | None:
@@ -147,7 +147,7 @@ class Query:
         return least
 
 
-def _is_within(rows: NDArray[Any], one: Within) -> NDArray[np.bool_]:
+def _is_within(rows: NDArray[Any], one: _Within) -> NDArray[np.bool_]:
     values = rows[MEASURES[one.measure].column].astype(np.float64)  # as precise as the query
     if MEASURES[one.measure].column == "azimuth":
         low, high = (free if math.isinf(end) else end for end, free in ((one.low, 0.0), (one.high, 360.0)))
@@ -167,11 +167,11 @@ def _code(names: tuple[str, ...], name: str) -> int:
     return names.index(name) if name in names else -1
 
 
-def _within(name: str, text: str) -> Within:
+def _within(name: str, text: str) -> _Within:
     low, comma, high = text.partition(",")
     if not comma:
         raise UserError(f"{name}: expected two numbers with a comma between them, found {text!r:.100}")
-    return Within(name, _number(name, low, -math.inf), _number(name, high, math.inf))
+    return _Within(name, _number(name, low, -math.inf), _number(name, high, math.inf))
 
 
 def _number(name: str, text: str, empty: float = math.nan) -> float:

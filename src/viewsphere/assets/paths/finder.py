@@ -35,7 +35,7 @@ class NotFoundError(Exception):
 
 
 @dataclass(frozen=True)
-class Found:
+class _Found:
     """A file, and whether it differs from the reference's own path."""
 
     path: Path
@@ -55,10 +55,12 @@ class Finder:
     confined: bool = True
     looked_for: dict[Path, None] = field(default_factory=dict[Path, None])
     _listings: dict[Path, dict[str, str]] = field(default_factory=dict[Path, dict[str, str]])
-    _found: dict[tuple[str, Path | None], Found | None] = field(default_factory=dict[tuple[str, "Path | None"], "Found | None"])
+    _found: dict[tuple[str, Path | None], _Found | None] = field(
+        default_factory=dict[tuple[str, "Path | None"], "_Found | None"]
+    )
     _files: dict[tuple[Path, ...], list[Path]] = field(default_factory=dict[tuple[Path, ...], list[Path]])
 
-    def find(self, reference: str, base: Path | None = None) -> Found:
+    def find(self, reference: str, base: Path | None = None) -> _Found:
         """The file of a reference, which may be percent-encoded, in another case, or written with backslashes.
 
         Its path is resolved from the model's folder, then from `base`, the folder of the file that holds the reference. If the
@@ -82,14 +84,14 @@ class Finder:
             self._found[reference, base] = self._search(names, base)
         return self._found[reference, base] is not None
 
-    def _search(self, names: list[str], base: Path | None) -> Found | None:
+    def _search(self, names: list[str], base: Path | None) -> _Found | None:
         starts = [self.model.parent] if base in (None, self.model.parent) else [self.model.parent, base]
         for name, folder in ((name, folder) for name in names for folder in starts):
             if not DRIVE.match(name) and (path := self._followed(folder, name)) is not None:
-                return Found(path)
+                return _Found(path)
         for last, folder in ((PurePosixPath(name).name, folder) for name in names for folder in self._folders(base)):
             if last and (path := self._followed(folder, last)) is not None:
-                return Found(path, elsewhere=PurePosixPath(last) not in map(PurePosixPath, names))
+                return _Found(path, elsewhere=PurePosixPath(last) not in map(PurePosixPath, names))
         return None
 
     def _folders(self, base: Path | None) -> list[Path]:

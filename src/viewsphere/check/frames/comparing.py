@@ -54,14 +54,14 @@ def _passes(sample: Sample, name: str, array: NDArray[Any]) -> Iterator[str]:
         yield f"{name}: expected {expected}; found {array[wrong].flat[0]:g} among {wrong.sum()} other numbers"
 
 
-def ids(sample: Sample) -> Iterator[str]:
+def _ids(sample: Sample) -> Iterator[str]:
     """Objects are numbered from 1, each once, in order."""
     ids = [o.id for o in sample.objects]
     if any(number < 1 for number in ids) or ids != sorted(set(ids)):
         yield f"expected objects 1, 2, ... in order, found {ids}"
 
 
-def camera(sample: Sample) -> Iterator[str]:
+def _camera(sample: Sample) -> Iterator[str]:
     """The camera's pose matches its azimuth, elevation, distance and tilt."""
     if sample.known_camera is None:
         return
@@ -80,5 +80,5 @@ def camera(sample: Sample) -> Iterator[str]:
         yield f"expected the camera at {stands.tolist()}, found it at {known.center.tolist()}"
 
 
-FRAME_PROOFS: dict[str, Callable[[Sample], Iterator[str]]] = {"files": files, "ids": ids, "camera": camera}
+FRAME_PROOFS: dict[str, Callable[[Sample], Iterator[str]]] = {"files": files, "ids": _ids, "camera": _camera}
 """Checks of every frame by name; the proofs of labels are in the labels' files."""

@@ -15,14 +15,14 @@ Difference = tuple[str, Any, Any]
 """The path of a field, the expected value and the stored one."""
 
 
-class Absent:
+class _Absent:
     """Represents a missing field."""
 
     def __repr__(self) -> str:
         return "no such field"
 
 
-ABSENT = Absent()
+ABSENT = _Absent()
 
 
 def differences(expected: Any, found: Any, path: str = "") -> Iterator[Difference]:
@@ -46,5 +46,5 @@ def in_words(found: Iterator[Difference], file: str, source: str) -> Iterator[st
 
 
 def _short(value: Any) -> str:
-    text = repr(value) if isinstance(value, Absent) else json.dumps(value)
+    text = repr(value) if isinstance(value, _Absent) else json.dumps(value)
     return shorten(text, 100, placeholder=" ...") if " " in text else text[:100]

@@ -21,7 +21,7 @@ from viewsphere.recipe.draws import Coordinate, Drawn
 Loop = Literal["once", "loop", "back_and_forth"]
 
 
-class Options(Frozen):
+class _Options(Frozen):
     """The animation of the model's file: at every instant it shows the nearest frame."""
 
     speed: Coordinate = Field(default=1.0, description="seconds of the file a second: 2 is twice as fast, -1 backwards")
@@ -32,7 +32,7 @@ class Options(Frozen):
     offset: Drawn[Strength] = Field(default=0.0, description="time of the file at 0 s, in seconds")
 
 
-def _moves(options: Options, start: Start) -> Move:
+def _moves(options: _Options, start: Start) -> Move:
     """The file's frame nearest to each time; poses stay."""
     line = start.timeline
     if line is None or not line.moves:
@@ -69,4 +69,4 @@ LOOPS: dict[Loop, Callable[[float, float], float]] = {"once": _once, "loop": _lo
 """The time within an animation of `length` seconds, from the seconds since its beginning."""
 
 
-MOTION = MotionSpec(options=Options, moves=_moves)
+MOTION = MotionSpec(options=_Options, moves=_moves)

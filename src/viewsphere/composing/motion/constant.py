@@ -12,7 +12,7 @@ from viewsphere.plugins.motion import MotionSpec
 from viewsphere.recipe.draws import Coordinate, Drawn
 
 
-class Options(Frozen):
+class _Options(Frozen):
     """At a constant velocity, turning at a constant rate; at 0 s it is where it was placed."""
 
     velocity: Drawn[tuple[Coordinate, Coordinate, Coordinate]] = Field(
@@ -24,10 +24,10 @@ class Options(Frozen):
     )
 
 
-def _moves(options: Options, start: Start) -> Move:
+def _moves(options: _Options, start: Start) -> Move:
     """A straight line, and a turn about one axis through the thing's origin."""
     velocity, spin = np.array(options.velocity), np.radians(options.spin_deg)
     return lambda time, pose: pose.turned(rotation_about(spin * time)).moved(velocity * time)
 
 
-MOTION = MotionSpec(options=Options, moves=_moves)
+MOTION = MotionSpec(options=_Options, moves=_moves)

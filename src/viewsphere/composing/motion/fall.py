@@ -13,14 +13,14 @@ from viewsphere.plugins.motion import MotionSpec
 from viewsphere.recipe.draws import Drawn
 
 
-class Options(Frozen):
+class _Options(Frozen):
     """The options of a fall from the layout `fall` or `container` to the place of rest."""
 
     begin: Drawn[Number] = Field(default=0.0, description="release time in seconds; before, the thing hangs in its place")
     speed: Drawn[Positive] = Field(default=1.0, description="speed factor: 0.25 is slow motion")
 
 
-def _moves(options: Options, start: Start) -> Move:
+def _moves(options: _Options, start: Start) -> Move:
     """The simulated states, with linear interpolation between them. All things of a scene fell together, so that different
     options for them make them overlap.
     """
@@ -37,4 +37,4 @@ def _moves(options: Options, start: Start) -> Move:
     return moved
 
 
-MOTION = MotionSpec(options=Options, moves=_moves)
+MOTION = MotionSpec(options=_Options, moves=_moves)

@@ -44,7 +44,7 @@ class Key(Frozen):
         return self
 
 
-class Options(Frozen):
+class _Options(Frozen):
     """Positions and rotations at given times, with linear interpolation. The first key holds before its time, the last one
     after its time.
     """
@@ -60,7 +60,7 @@ class Options(Frozen):
     )
 
     @model_validator(mode="after")
-    def _check(self) -> Options:
+    def _check(self) -> _Options:
         for i, (a, b) in enumerate(pairwise(self.keys), 1):
             if b.time <= a.time:
                 with error_at("keys", i, "time"):
@@ -68,7 +68,7 @@ class Options(Frozen):
         return self
 
 
-def _moves(options: Options, start: Start) -> Move:
+def _moves(options: _Options, start: Start) -> Move:
     """Positions in straight lines; rotations by slerp, the shorter way around at a constant rate (Shoemake 1985)."""
     positions = [(key.time, np.array(key.position)) for key in options.keys if key.position is not None]
     turns = [(key.time, turn) for key in options.keys if (turn := _quaternion(key)) is not None]
@@ -108,4 +108,4 @@ def _quaternion(key: Key) -> Float | None:
     return quaternion_product(z, quaternion_product(y, x))
 
 
-MOTION = MotionSpec(options=Options, moves=_moves)
+MOTION = MotionSpec(options=_Options, moves=_moves)

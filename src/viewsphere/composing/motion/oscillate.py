@@ -15,7 +15,7 @@ from viewsphere.plugins.motion import MotionSpec
 from viewsphere.recipe.draws import Coordinate, Drawn
 
 
-class Options(Frozen):
+class _Options(Frozen):
     """Oscillation, as the sine of time: at 0 s in the middle, the pose without this motion, unless phase_deg shifts it."""
 
     position: Amplitude = Field(default=(0.0, 0.0, 0.0), description="[x, y, z]: amplitude in metres along the world's axes")
@@ -28,7 +28,7 @@ class Options(Frozen):
     )
 
 
-def _moves(options: Options, start: Start) -> Move:
+def _moves(options: _Options, start: Start) -> Move:
     """A sine of position and angle."""
     side, turn = np.array(options.position), np.radians(options.rotation_deg)
     phase = math.radians(options.phase_deg)
@@ -40,4 +40,4 @@ def _moves(options: Options, start: Start) -> Move:
     return moved
 
 
-MOTION = MotionSpec(options=Options, moves=_moves)
+MOTION = MotionSpec(options=_Options, moves=_moves)

@@ -19,7 +19,7 @@ from viewsphere.validation.errors import one_of
 ANY = "any"
 
 
-class Options(Frozen):
+class _Options(Frozen):
     """Along a lane of the place, or along points of the world, at a constant speed. The thing keeps its height above z = 0 as
     its height above the path.
     """
@@ -46,7 +46,7 @@ class Options(Frozen):
     )
 
     @model_validator(mode="after")
-    def _check(self) -> Options:
+    def _check(self) -> _Options:
         if (self.lane is None) == (self.points is None):
             raise ValueError(f"expected one of lane, points; found {'none' if self.lane is None else 'both'}")
         if self.lane is not None and self.closed:
@@ -54,7 +54,7 @@ class Options(Frozen):
         return self
 
 
-def _moves(options: Options, start: Start) -> Move:
+def _moves(options: _Options, start: Start) -> Move:
     """The path by its arc length."""
     curve = _curve(options, start)
     if not curve.closed and options.offset > curve.length:
@@ -72,7 +72,7 @@ def _moves(options: Options, start: Start) -> Move:
     return moved
 
 
-def _curve(options: Options, start: Start) -> Curve:
+def _curve(options: _Options, start: Start) -> Curve:
     if options.lane is None:
         return curve_through(options.points or (), options.closed, f"{start.field}.points")
     lane = _lane(options.lane, start)
@@ -94,4 +94,4 @@ def _lane(name: str, start: Start) -> Lane:
     return lanes[name]
 
 
-MOTION = MotionSpec(options=Options, moves=_moves)
+MOTION = MotionSpec(options=_Options, moves=_moves)

@@ -14,7 +14,7 @@ from viewsphere.plugins.motion import MotionSpec
 from viewsphere.recipe.draws import Drawn
 
 
-class Options(Frozen):
+class _Options(Frozen):
     """Smooth random motion around the pose without it, bounded by the highest frequency and the amplitudes."""
 
     position: Amplitude = Field(
@@ -26,7 +26,7 @@ class Options(Frozen):
     highest_hz: Drawn[Positive] = Field(default=0.5, description="highest frequency, hertz")
 
 
-def _moves(options: Options, start: Start) -> Move:
+def _moves(options: _Options, start: Start) -> Move:
     """Band-limited noise (`viewsphere.composing.noise`) of six components."""
     sides, turns = np.array(options.position), np.radians(options.rotation_deg)
     way = noise(start.rng("noise"), 6, options.highest_hz)
@@ -38,4 +38,4 @@ def _moves(options: Options, start: Start) -> Move:
     return moved
 
 
-MOTION = MotionSpec(options=Options, moves=_moves)
+MOTION = MotionSpec(options=_Options, moves=_moves)

@@ -13,7 +13,7 @@ from viewsphere.plugins.motion import MotionSpec
 from viewsphere.recipe.draws import Drawn, PointDrawn
 
 
-class Options(Frozen):
+class _Options(Frozen):
     """Along a smooth curve through points at a constant speed. At 0 s it is at the first; at the last it stays."""
 
     points: Annotated[tuple[PointDrawn, ...], Field(min_length=2)] = Field(description="[x, y, z] each: metres, world axes")
@@ -30,7 +30,7 @@ class Options(Frozen):
     )
 
 
-def _moves(options: Options, start: Start) -> Move:
+def _moves(options: _Options, start: Start) -> Move:
     """The centripetal Catmull-Rom curve (`viewsphere.geometry.curve`) by its arc length."""
     curve = curve_through(options.points, options.closed, f"{start.field}.points")
 
@@ -42,4 +42,4 @@ def _moves(options: Options, start: Start) -> Move:
     return moved
 
 
-MOTION = MotionSpec(options=Options, moves=_moves)
+MOTION = MotionSpec(options=_Options, moves=_moves)

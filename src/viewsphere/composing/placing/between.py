@@ -25,7 +25,7 @@ TRIES = 200
 """Number of tried spots for one thing; each is a little farther from the model."""
 
 
-class Options(Frozen):
+class _Options(Frozen):
     """The options for objects in the line of sight."""
 
     stand: Literal["floor", "sight"] = Field(
@@ -38,7 +38,7 @@ class Options(Frozen):
 
 
 def _place(
-    cast: Sequence[ModelSpec], room: Room, shapes: Sequence[Shape], views: Sequence[Camera], rng: Draws, options: Options
+    cast: Sequence[ModelSpec], room: Room, shapes: Sequence[Shape], views: Sequence[Camera], rng: Draws, options: _Options
 ) -> Sequence[Matrix4]:
     """Poses turned at random, as near to the model as the gap allows, or a little farther; raises RecipeError if there is not
     enough room, or no known camera.
@@ -80,4 +80,4 @@ def _place(
     return poses
 
 
-PLACER = PlacerSpec(options=Options, place=_place)
+PLACER = PlacerSpec(options=_Options, place=_place)

@@ -30,7 +30,7 @@ ROOMY = 0.5
 """Share of a box's volume filled by the models' boxes, if the recipe gives no size."""
 
 
-class Options(Matter):
+class _Options(Matter):
     """The options for things that fall into a box."""
 
     size: tuple[Drawn[Length], Drawn[Length], Drawn[Length]] | None = Field(
@@ -39,24 +39,24 @@ class Options(Matter):
 
 
 def _place(
-    cast: Sequence[ModelSpec], room: Room, shapes: Sequence[Shape], views: Sequence[Camera], rng: Draws, options: Options
+    cast: Sequence[ModelSpec], room: Room, shapes: Sequence[Shape], views: Sequence[Camera], rng: Draws, options: _Options
 ) -> Sequence[Matrix4]:
     """Poses at rest in the box; raises RecipeError if the box is too small."""
     return poses_of(_fallen(cast, room, shapes, rng, options))
 
 
-def _ways(cast: Sequence[ModelSpec], room: Room, shapes: Sequence[Shape], rng: Draws, options: Options) -> Sequence[Way]:
+def _ways(cast: Sequence[ModelSpec], room: Room, shapes: Sequence[Shape], rng: Draws, options: _Options) -> Sequence[Way]:
     """Return the path of each falling thing."""
     return ways_of(_fallen(cast, room, shapes, rng, options))
 
 
-def _around(cast: Sequence[ModelSpec], room: Room, shapes: Sequence[Shape], rng: Draws, options: Options) -> Sequence[Piece]:
+def _around(cast: Sequence[ModelSpec], room: Room, shapes: Sequence[Shape], rng: Draws, options: _Options) -> Sequence[Piece]:
     """The box."""
     width, height, length = _size(shapes, rng, options)
     return [Piece(model_for("box"), (width, height, length), IDENTITY)]
 
 
-def _fallen(cast: Sequence[ModelSpec], room: Room, shapes: Sequence[Shape], rng: Draws, options: Options) -> dict[str, Any]:
+def _fallen(cast: Sequence[ModelSpec], room: Room, shapes: Sequence[Shape], rng: Draws, options: _Options) -> dict[str, Any]:
     def made() -> dict[str, Any]:
         width, height, length = size = _size(shapes, rng, options)
         _check(cast, room, shapes, size)
@@ -71,7 +71,7 @@ def _fallen(cast: Sequence[ModelSpec], room: Room, shapes: Sequence[Shape], rng:
     return room.memory(made)
 
 
-def _size(shapes: Sequence[Shape], rng: Draws, options: Options) -> tuple[float, float, float]:
+def _size(shapes: Sequence[Shape], rng: Draws, options: _Options) -> tuple[float, float, float]:
     """Width, height and length, outside."""
     if options.size is not None:
         width, length, height = drawn(options.size, draws_of(rng))
@@ -104,4 +104,4 @@ def _check(cast: Sequence[ModelSpec], room: Room, shapes: Sequence[Shape], size:
         )
 
 
-PLACER = PlacerSpec(options=Options, place=_place, ways=_ways, around=_around, is_slow=True, packages=("mujoco", "scipy"))
+PLACER = PlacerSpec(options=_Options, place=_place, ways=_ways, around=_around, is_slow=True, packages=("mujoco", "scipy"))

@@ -27,7 +27,7 @@ TOP = 0.03
 """Thickness of a surface above the floor, metres."""
 
 
-class Options(Matter):
+class _Options(Matter):
     """The options for falling things."""
 
     spread: tuple[Drawn[Length], Drawn[Length]] | None = Field(
@@ -40,18 +40,18 @@ class Options(Matter):
 
 
 def _place(
-    cast: Sequence[ModelSpec], room: Room, shapes: Sequence[Shape], views: Sequence[Camera], rng: Draws, options: Options
+    cast: Sequence[ModelSpec], room: Room, shapes: Sequence[Shape], views: Sequence[Camera], rng: Draws, options: _Options
 ) -> Sequence[Matrix4]:
     """Poses at rest, or in flight; raises RecipeError if things do not come to rest on the free surface."""
     return poses_of(_fallen(cast, room, shapes, rng, options))
 
 
-def _ways(cast: Sequence[ModelSpec], room: Room, shapes: Sequence[Shape], rng: Draws, options: Options) -> Sequence[Way]:
+def _ways(cast: Sequence[ModelSpec], room: Room, shapes: Sequence[Shape], rng: Draws, options: _Options) -> Sequence[Way]:
     """Return the path of each falling thing; empty where things are caught in flight."""
     return ways_of(_fallen(cast, room, shapes, rng, options)) if options.moment == "rest" else ()
 
 
-def _fallen(cast: Sequence[ModelSpec], room: Room, shapes: Sequence[Shape], rng: Draws, options: Options) -> dict[str, Any]:
+def _fallen(cast: Sequence[ModelSpec], room: Room, shapes: Sequence[Shape], rng: Draws, options: _Options) -> dict[str, Any]:
     def made() -> dict[str, Any]:
         region = _region(room, shapes, rng, options)
         boards = (_top(room.free, room.below),) if room.free is not None and room.below else ()
@@ -61,7 +61,7 @@ def _fallen(cast: Sequence[ModelSpec], room: Room, shapes: Sequence[Shape], rng:
     return room.memory(made)
 
 
-def _region(room: Room, shapes: Sequence[Shape], rng: Draws, options: Options) -> Footprint:
+def _region(room: Room, shapes: Sequence[Shape], rng: Draws, options: _Options) -> Footprint:
     """The part of the free floor over which things are dropped."""
     if options.spread is not None:
         wide, long = drawn(options.spread, draws_of(rng))
@@ -80,4 +80,4 @@ def _top(free: Footprint, below: float) -> Board:
     return Board((x, y, -half), (float(free.half[0]), float(free.half[1]), half), turn)
 
 
-PLACER = PlacerSpec(options=Options, place=_place, ways=_ways, is_slow=True, packages=("mujoco", "scipy"))
+PLACER = PlacerSpec(options=_Options, place=_place, ways=_ways, is_slow=True, packages=("mujoco", "scipy"))

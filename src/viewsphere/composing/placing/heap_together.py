@@ -13,15 +13,15 @@ from viewsphere.model.sensors.camera import Camera
 from viewsphere.plugins.placer import PlacerSpec
 
 
-class Options(Gaps):
+class _Options(Gaps):
     """Options of how closely models stand."""
 
 
 def _place(
-    cast: Sequence[ModelSpec], room: Room, shapes: Sequence[Shape], views: Sequence[Camera], rng: Draws, options: Options
+    cast: Sequence[ModelSpec], room: Room, shapes: Sequence[Shape], views: Sequence[Camera], rng: Draws, options: _Options
 ) -> Sequence[Matrix4]:
     """Poses near the middle, or near things already in place; raises RecipeError if no spot is found for a model."""
     return scattered(cast, room, shapes, rng, options, free_spot)
 
 
-PLACER = PlacerSpec(options=Options, place=_place)
+PLACER = PlacerSpec(options=_Options, place=_place)

@@ -30,7 +30,7 @@ LOOSE = 8.0
 """Ratio of the floor's area to that of the models' boxes: 20 cars in a street with furniture find room at the first draw."""
 
 
-class Options(Gaps):
+class _Options(Gaps):
     """Options: gaps between models, and their distance from the middle."""
 
     reach: Drawn[Length] | None = Field(
@@ -41,7 +41,7 @@ class Options(Gaps):
 
 
 def _place(
-    cast: Sequence[ModelSpec], room: Room, shapes: Sequence[Shape], views: Sequence[Camera], rng: Draws, options: Options
+    cast: Sequence[ModelSpec], room: Room, shapes: Sequence[Shape], views: Sequence[Camera], rng: Draws, options: _Options
 ) -> Sequence[Matrix4]:
     """Poses, no two boxes, or hulls, nearer than the room's gap; raises RecipeError if no spot is found for one."""
     if room.free is None or room.taken:
@@ -77,4 +77,4 @@ def _within(floor: Footprint, reach: float) -> Footprint:
     return replace(floor, center=(low + high) / 2 @ floor.axes, half=(high - low) / 2)
 
 
-PLACER = PlacerSpec(options=Options, place=_place)
+PLACER = PlacerSpec(options=_Options, place=_place)

@@ -35,7 +35,7 @@ AIR = 0.001
 """Metres between one thing and the next when they are piled up."""
 
 
-class Options(Matter):
+class _Options(Matter):
     """The options for piles."""
 
     high: CountDrawn = Field(
@@ -55,13 +55,13 @@ class _Pile:
 
 
 def _place(
-    cast: Sequence[ModelSpec], room: Room, shapes: Sequence[Shape], views: Sequence[Camera], rng: Draws, options: Options
+    cast: Sequence[ModelSpec], room: Room, shapes: Sequence[Shape], views: Sequence[Camera], rng: Draws, options: _Options
 ) -> Sequence[Matrix4]:
     """Poses at rest; raises RecipeError if a pile collapses, or has no room."""
     return poses_of(room.memory(lambda: {"poses": _piled(cast, room, shapes, rng, options)}))
 
 
-def _piled(cast: Sequence[ModelSpec], room: Room, shapes: Sequence[Shape], rng: Draws, options: Options) -> list[Matrix4]:
+def _piled(cast: Sequence[ModelSpec], room: Room, shapes: Sequence[Shape], rng: Draws, options: _Options) -> list[Matrix4]:
     poses: list[Any] = [IDENTITY] * len(cast)
     others, first, highest, asked = Others(), 0, 1, 1
     for there in room.prints:
@@ -85,13 +85,13 @@ def _piled(cast: Sequence[ModelSpec], room: Room, shapes: Sequence[Shape], rng: 
     return poses
 
 
-def _highest(cast: Sequence[ModelSpec], shapes: Sequence[Shape], slots: range, rng: Draws, options: Options) -> _Pile:
+def _highest(cast: Sequence[ModelSpec], shapes: Sequence[Shape], slots: range, rng: Draws, options: _Options) -> _Pile:
     """A pile of these models, or of as many of the first ones as stay on one another."""
     pile = _pile(cast, shapes, tuple(slots), rng, options)
     return pile if pile.standing == len(slots) else _highest(cast, shapes, slots[:-1], rng, options)
 
 
-def _pile(cast: Sequence[ModelSpec], shapes: Sequence[Shape], slots: tuple[int, ...], rng: Draws, options: Options) -> _Pile:
+def _pile(cast: Sequence[ModelSpec], shapes: Sequence[Shape], slots: tuple[int, ...], rng: Draws, options: _Options) -> _Pile:
     """The first try of a pile that stands, else the try with the most standing models."""
     best: _Pile | None = None
     bodies = [_body(cast[slot], shapes[slot], slot, rng, options) for slot in slots]
@@ -134,9 +134,9 @@ def _tried(world: World, shapes: Sequence[Shape], slots: tuple[int, ...], own: n
     return _Pile(slots, world.poses, len(slots) - len(fallen()) if calm else 1, box)
 
 
-def _body(spec: ModelSpec, shape: Shape, slot: int, rng: Draws, options: Options) -> Any:
+def _body(spec: ModelSpec, shape: Shape, slot: int, rng: Draws, options: _Options) -> Any:
     own = drawn(options, draws_of(rng, str(slot), spec.key))
     return body_of([shape.hull], own.density, own.mass, Touch(own.friction, own.restitution))
 
 
-PLACER = PlacerSpec(options=Options, place=_place, is_slow=True, packages=("mujoco", "scipy"))
+PLACER = PlacerSpec(options=_Options, place=_place, is_slow=True, packages=("mujoco", "scipy"))

@@ -40,7 +40,7 @@ PAVEMENT = (1.5, 2.2)
 """Metres from the right edge of a lane to the path of walkers, in places without pavements."""
 
 
-class Options(Frozen):
+class _Options(Frozen):
     """Options of traffic: vehicles that drive or park, and walkers."""
 
     parked: Drawn[Portion] = Field(default=0.35, description="chance of a vehicle to park, if there is room")
@@ -71,7 +71,7 @@ class _Roads:
 
 
 def _place(
-    cast: Sequence[ModelSpec], room: Room, shapes: Sequence[Shape], views: Sequence[Camera], rng: Draws, options: Options
+    cast: Sequence[ModelSpec], room: Room, shapes: Sequence[Shape], views: Sequence[Camera], rng: Draws, options: _Options
 ) -> Sequence[Matrix4]:
     """Poses along the lanes, each in its lane's direction, walkers in either; raises RecipeError if the place has no lanes, or
     if no spot is found for a thing.
@@ -111,7 +111,7 @@ def _roads(room: Room, shapes: Sequence[Shape], reach: float) -> _Roads:
 
 
 def _free(
-    draws: np.random.Generator, roads: _Roads, shape: Shape, options: Options, others: Crowd
+    draws: np.random.Generator, roads: _Roads, shape: Shape, options: _Options, others: Crowd
 ) -> tuple[Matrix4, Footprint] | None:
     """A pose on the roads that is clear of others, and its footprint; None if none is found."""
     drives = _size(shape)[1] >= VEHICLE
@@ -142,7 +142,7 @@ def _in_bays(draws: np.random.Generator, bays: Sequence[Bay], shape: Shape) -> I
 
 
 def _along(
-    draws: np.random.Generator, roads: _Roads, shape: Shape, options: Options, drives: bool, is_parked: bool
+    draws: np.random.Generator, roads: _Roads, shape: Shape, options: _Options, drives: bool, is_parked: bool
 ) -> Iterator[Matrix4]:
     """Poses along lanes for vehicles, along pavements for everything else."""
     on_pavement = not drives and options.pavement is None and len(roads.pavements) > 0
@@ -191,4 +191,4 @@ def _steps(lanes: Sequence[Lane], reach: float) -> Float:
     return np.array(steps).reshape(-1, 7)
 
 
-PLACER = PlacerSpec(options=Options, place=_place)
+PLACER = PlacerSpec(options=_Options, place=_place)

@@ -31,7 +31,7 @@ ROOMY = 0.08
 """Share of the volume filled by the things' boxes, if the recipe gives no size."""
 
 
-class Options(Frozen):
+class _Options(Frozen):
     """The positions of things in the air."""
 
     size: tuple[Drawn[Length], Drawn[Length], Drawn[Length]] | None = Field(
@@ -41,7 +41,7 @@ class Options(Frozen):
 
 
 def _place(
-    cast: Sequence[ModelSpec], room: Room, shapes: Sequence[Shape], views: Sequence[Camera], rng: Draws, options: Options
+    cast: Sequence[ModelSpec], room: Room, shapes: Sequence[Shape], views: Sequence[Camera], rng: Draws, options: _Options
 ) -> Sequence[Matrix4]:
     """Poses turned about the vertical at random, with no two turned boxes nearer than the room's gap; raises RecipeError if no
     spot is found for a thing.
@@ -66,7 +66,7 @@ def _place(
     return poses
 
 
-def _extent(shapes: Sequence[Shape], rng: Draws, options: Options) -> tuple[Float, float]:
+def _extent(shapes: Sequence[Shape], rng: Draws, options: _Options) -> tuple[Float, float]:
     """Size (3,) of the box, and the height of its bottom."""
     height = drawn(options.height, draws_of(rng, "height"))
     if options.size is not None:
@@ -107,4 +107,4 @@ def apart(a: Float, b: Float, gap: float) -> bool:
     return False
 
 
-PLACER = PlacerSpec(options=Options, place=_place)
+PLACER = PlacerSpec(options=_Options, place=_place)

@@ -37,7 +37,7 @@ Turn = Callable[[Names], int]
 
 
 @dataclass(frozen=True)
-class Labelled:
+class _Labelled:
     """An object that is labelled, the names of all objects that are part of it, and its category."""
 
     root: SceneObject
@@ -97,7 +97,7 @@ class BlendScenery(Sendable):
             return hashlib.file_digest(file, "sha256").hexdigest()
 
     @cached_property
-    def labelled(self) -> tuple[Labelled, ...]:
+    def labelled(self) -> tuple[_Labelled, ...]:
         """The labelled objects that are visible in renders at any time, ordered by name."""
         category = {one.name: self._category(one) for one in self.file.objects}
         root_of = {one.name: self._root(one, category) for one in self.file.objects}
@@ -106,7 +106,7 @@ class BlendScenery(Sendable):
             if (root := root_of[one.name]) is not None and one.parts:
                 members.setdefault(root.name, []).append(one.name)
         by_name = self.file.by_name
-        return tuple(Labelled(by_name[name], tuple(found), category[name] or "") for name, found in sorted(members.items()))
+        return tuple(_Labelled(by_name[name], tuple(found), category[name] or "") for name, found in sorted(members.items()))
 
     def _category(self, one: SceneObject) -> str | None:
         """Return the category of an object itself; None if no rule fits."""
@@ -246,7 +246,7 @@ class BlendScenery(Sendable):
         """The labelled objects' models, of all variants."""
         return (self._piece(one, category_id).model for one in self.labelled)
 
-    def _piece(self, one: Labelled, category_id: Naming) -> SceneryPiece:
+    def _piece(self, one: _Labelled, category_id: Naming) -> SceneryPiece:
         labels: Labels = "own"
         axes = one.root.file_from_object
         parts = Parts(only=one.members, file_from_axes=_rows(axes))

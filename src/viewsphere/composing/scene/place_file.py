@@ -42,7 +42,7 @@ NEAR = 0.02
 
 
 @dataclass(frozen=True)
-class FileFloor:
+class _FileFloor:
     """The floor of a place's file, as a rectangle in the place's axes: its frame, whose origin is the middle of its top, its
     size along the frame's x and y, and metres from its top down to its lowest point.
     """
@@ -77,7 +77,7 @@ class FileOffers:
     `lanes` and `surfaces` match those of a zoo's `Place`, ordered by name. Access to either raises its `mistakes`.
     """
 
-    floor: FileFloor | None
+    floor: _FileFloor | None
     all_lanes: tuple[Lane, ...]
     all_surfaces: tuple[Surface, ...]
     indoors: bool
@@ -237,8 +237,8 @@ def _named(found: list[dict[str, Any]]) -> Iterator[tuple[str, dict[str, Any]]]:
         yield name, one
 
 
-def _floor(one: dict[str, Any]) -> FileFloor:
-    return FileFloor(one["name"], _frame(one), (one["size"][0], one["size"][1]), one["depth"])
+def _floor(one: dict[str, Any]) -> _FileFloor:
+    return _FileFloor(one["name"], _frame(one), (one["size"][0], one["size"][1]), one["depth"])
 
 
 def _frame(one: dict[str, Any]) -> Matrix4:

@@ -192,7 +192,7 @@ class RepeatedPoses(Poses):
 
 
 @dataclass(frozen=True)
-class GridPoses(Poses):
+class _GridPoses(Poses):
     """The combinations of a grid: tilt outermost, then distance, elevation, azimuth innermost."""
 
     viewpoints: Grid | Jitter
@@ -240,7 +240,7 @@ class GridPoses(Poses):
 
 
 @dataclass(frozen=True)
-class JitteredPoses(Poses):
+class _JitteredPoses(Poses):
     """Random offsets on a grid; the draws for one pose of the grid follow one another."""
 
     viewpoints: Jitter
@@ -272,8 +272,8 @@ class JitteredPoses(Poses):
         return self._grid.fill(index // self.viewpoints.count)
 
     @cached_property
-    def _grid(self) -> GridPoses:
-        return GridPoses(self.viewpoints, self.seed)
+    def _grid(self) -> _GridPoses:
+        return _GridPoses(self.viewpoints, self.seed)
 
 
 @dataclass(frozen=True)
@@ -316,7 +316,7 @@ class SpherePoses(Poses):
 
 
 @dataclass(frozen=True)
-class NormalPoses(Poses):
+class _NormalPoses(Poses):
     """Normal around one pose."""
 
     viewpoints: Normal
@@ -463,13 +463,13 @@ def poses(viewpoints: Viewpoints, seed: int, folder: Path = Path()) -> Poses:
             path = folder / Path(viewpoints.path).expanduser()
             return ListedPoses(viewpoints, seed, pose_file(path, viewpoints))
         case Jitter():
-            return JitteredPoses(viewpoints, seed)
+            return _JitteredPoses(viewpoints, seed)
         case Sphere():
             return SpherePoses(viewpoints, seed)
         case Normal():
-            return NormalPoses(viewpoints, seed)
+            return _NormalPoses(viewpoints, seed)
         case Grid():
-            return GridPoses(viewpoints, seed)
+            return _GridPoses(viewpoints, seed)
         case _:
             raise RecipeError(
                 "viewpoints.kind: expected grid, sphere, normal, jitter or file without time; found "

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from viewsphere.model.shot import Shot
 
 
-def check(options: Mapping[str, JsonValue]) -> None:
+def _check(options: Mapping[str, JsonValue]) -> None:
     """Raise UserError for an unknown option (with the nearest name) or a value out of range."""
     from viewsphere.engines.raster.options import parse_options
 
@@ -35,4 +35,4 @@ def stage(shot: Shot, load: Load) -> RasterStage:
     return build_stage(shot, load)
 
 
-ENGINE = EngineSpec(check=check, stage=stage, paints=tuple(PASSES))
+ENGINE = EngineSpec(check=_check, stage=stage, paints=tuple(PASSES))

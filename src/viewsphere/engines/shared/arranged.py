@@ -63,7 +63,7 @@ class Arranged:
 
 
 @dataclass(frozen=True)
-class Look:
+class _Look:
     """The appearance of a mesh: a model at a time step, with its changes to materials."""
 
     model: ModelSpec
@@ -77,16 +77,16 @@ class Look:
 
 
 @dataclass(frozen=True, eq=False)
-class Shown:
+class _Shown:
     """Gives models at their time steps; the latest `STEPS` are cached, so that a repeated request returns the same object."""
 
     load: Load
     soaked: float = 0.0
-    _held: dict[Look, Mesh] = field(default_factory=dict[Look, Mesh])
+    _held: dict[_Look, Mesh] = field(default_factory=dict[_Look, Mesh])
 
     def mesh(self, thing: Thing, step: TimeStep, resting: Mesh) -> Mesh:
         """A thing's mesh at a time step, which shares equal data with the mesh at rest."""
-        look = Look(thing.model, step, thing.repaints)
+        look = _Look(thing.model, step, thing.repaints)
         mesh_now = self._held.pop(look, None) or sharing(self._soaked(look.mesh(self.load)), resting)
         self._held[look] = mesh_now  # the most recently used comes last
         if len(self._held) > STEPS:
@@ -105,7 +105,7 @@ class Arrangements:
     """
 
     shot: Shot
-    shown: Shown
+    shown: _Shown
     meshes: tuple[Mesh, ...]  # at rest
     floor: Floor | None
     ring: Ring
@@ -119,7 +119,7 @@ class Arrangements:
         meshes = _dressed(shot.things, placed_meshes(shot.things, load), soaked)
         if shot.scene.lamps is not None:
             meshes = lit(shot.things, meshes, shot.scene.lamps)
-        return cls(shot, Shown(load, soaked), meshes, None, ring).for_shot(shot)
+        return cls(shot, _Shown(load, soaked), meshes, None, ring).for_shot(shot)
 
     def for_shot(self, shot: Shot) -> Arrangements:
         """The arrangements of another shot with an equal `stage_key`, which share the loaded meshes."""

@@ -50,7 +50,7 @@ ENGINE = "cycles"
 """The engine that builds and saves the scenes."""
 
 
-def check() -> None:
+def _check() -> None:
     """Raise UserError if Blender is missing."""
     plugins.load(EngineSpec, ENGINE).check({})
 
@@ -255,6 +255,6 @@ FORMAT = FormatSpec(
     keeps_all_objects=True,  # hidden objects are part of a scene, too
     names_credits=False,
     refuses=_refuses,
-    check=check,
+    check=_check,
     writer=_writer,
 )

@@ -80,7 +80,7 @@ def entries(sample: Sample, numbers: Mapping[str, int], scale: float) -> list[En
     valid = _depth(sample, scale) > 0
     listed = ((o, inside) for o in sample.objects if (inside := _inside(sample, o)))
     return [
-        Entry(pose(o, numbers), _info(o, inside, valid, sample.width, sample.height), o.amodal, o.rle) for o, inside in listed
+        Entry(_pose(o, numbers), _info(o, inside, valid, sample.width, sample.height), o.amodal, o.rle) for o, inside in listed
     ]
 
 
@@ -95,7 +95,7 @@ def _inside(sample: Sample, o: ObjectAnnotation) -> int:
     return inside
 
 
-def pose(o: ObjectAnnotation, numbers: Mapping[str, int]) -> dict[str, Any]:
+def _pose(o: ObjectAnnotation, numbers: Mapping[str, int]) -> dict[str, Any]:
     """An object's pose in the camera, in mm; an imported one keeps its number."""
     m = o.camera_from_object
     number = numbers[o.key] if o.key in numbers else (o.source or {})["obj_id"]

@@ -64,18 +64,18 @@ TYPES = 4
 """Largest number of files of a frame in one folder."""
 
 
-class Options(Frozen):
+class _Options(Frozen):
     """The option of disparity."""
 
     stereo: bool = Field(default=False, description="disparity of the left pictures, too; of a rig of two rectified cameras")
 
 
-def _needs(options: Options) -> tuple[str, ...]:
+def _needs(options: _Options) -> tuple[str, ...]:
     """Disparity on request."""
     return ("disparity",) if options.stereo else ()
 
 
-def _refuses(scope: Scope, options: Options) -> Iterator[str]:
+def _refuses(scope: Scope, options: _Options) -> Iterator[str]:
     """Reasons to refuse: rigs of several cameras other than a pair, lenses that camera.json cannot express, and more instances
     than ids.
     """
@@ -87,10 +87,10 @@ def _refuses(scope: Scope, options: Options) -> Iterator[str]:
     yield from refusals.most_objects(scope, EACH)
 
 
-class Cityscapes(Tree):
+class _Cityscapes(Tree):
     """The tree of cities."""
 
-    def __init__(self, dataset: Dataset, options: Options) -> None:
+    def __init__(self, dataset: Dataset, options: _Options) -> None:
         super().__init__(dataset)
         self._options, self._eyes, self._timeline = options, Eyes(dataset), Timeline(dataset)
         self._labels = labels_of(dataset.classes)
@@ -151,14 +151,14 @@ def _camera(sample: Sample, baseline: float) -> dict[str, dict[str, float]]:
     }
 
 
-preparer, writer, verify = functions(Cityscapes)
+preparer, writer, verify = functions(_Cityscapes)
 
 
 FORMAT = FormatSpec(
     about=__doc__,
     holds=("semantic masks", "instance masks", "polygons", "stereo pairs", "disparity", "calibration"),
     read_by=("torchvision", "cityscapesScripts"),
-    options=Options,
+    options=_Options,
     channels=("rgb", "instances", "semantic"),
     names_credits=False,
     needs=_needs,

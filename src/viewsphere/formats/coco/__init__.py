@@ -46,7 +46,7 @@ if TYPE_CHECKING:
 # Plans read only the options, so each function imports its code when it is called.
 
 
-def writer(
+def _writer(
     dataset: Dataset, folder: Path, note: Callable[[str], None], options: Options
 ) -> AbstractContextManager[Callable[[Entry], None]]:
     """Write the instances JSON of each split, and models."""
@@ -55,7 +55,7 @@ def writer(
     return writer(dataset, folder, note, options)
 
 
-def preparer(dataset: Dataset, folder: Path, options: Options) -> Callable[[Sample], Entry]:
+def _preparer(dataset: Dataset, folder: Path, options: Options) -> Callable[[Sample], Entry]:
     """Puts a sample's images and masks in place, and makes its entries of the instances JSON."""
     from viewsphere.formats.coco.writing import preparer
 
@@ -69,7 +69,7 @@ def verify(dataset: Dataset, folder: Path, sampled: Collection[int], options: Op
     return verify(dataset, folder, sampled, options)
 
 
-def read(path: Path, *, keep_going: bool = False) -> ForeignDataset:
+def _read(path: Path, *, keep_going: bool = False) -> ForeignDataset:
     """A COCO data set from another source."""
     from viewsphere.formats.coco.reading import read
 
@@ -83,8 +83,8 @@ FORMAT = FormatSpec(
     options=Options,
     channels=CHANNELS,
     notes=notes,
-    writer=writer,
-    preparer=preparer,
+    writer=_writer,
+    preparer=_preparer,
     verify=verify,
-    read=read,
+    read=_read,
 )

@@ -51,13 +51,13 @@ SHARED = 1
 """The number of the rig shared by all frames with the first frame's lenses."""
 
 
-class Options(Frozen):
+class _Options(Frozen):
     """The encoding of the model."""
 
     kind: Literal["text", "binary"] = Field(default="text", description="`text`: .txt files; `binary`: .bin files")
 
 
-def _refuses(scope: Scope, options: Options) -> Iterator[str]:
+def _refuses(scope: Scope, options: _Options) -> Iterator[str]:
     """Reasons to refuse: unknown cameras, skew, lenses that OpenCV lacks, and splits named like a model's files."""
     yield from known_cameras(scope)
     yield from no_skew(scope)
@@ -66,10 +66,10 @@ def _refuses(scope: Scope, options: Options) -> Iterator[str]:
         yield f"expected splits of other names than {', '.join(KINDS)}; found {name}"
 
 
-class Colmap(Tree):
+class _Colmap(Tree):
     """A model for each world."""
 
-    def __init__(self, dataset: Dataset, options: Options) -> None:
+    def __init__(self, dataset: Dataset, options: _Options) -> None:
         super().__init__(dataset)
         self._binary = options.kind == "binary"
         self._rigs, self._sights = Rigs(dataset), Sights(dataset)
@@ -145,14 +145,14 @@ def _rig(number: int, cameras: Iterable[int], mounts: Iterable[np.ndarray[Any, A
     return Rig(number, list(cameras), [pose_of(R, -transform(R, place)) for R, place in turned])
 
 
-preparer, writer, verify = functions(Colmap)
+preparer, writer, verify = functions(_Colmap)
 
 
 FORMAT = FormatSpec(
     about=__doc__,
     holds=("cameras", "poses", "rigs", "points"),
     read_by=("pycolmap", "COLMAP", "Gaussian splatting"),
-    options=Options,
+    options=_Options,
     channels=("rgb", "depth"),
     names_credits=False,
     refuses=_refuses,

@@ -24,7 +24,7 @@ STILL = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
-class Shown:
+class _Shown:
     """Points that an image shows, (N,) of `SEEN`, and the points that it adds to the model."""
 
     seen: NDArray[np.void]
@@ -38,7 +38,7 @@ class Sights:
         self._dataset = dataset
         self._followed = lru_cache(maxsize=4)(self._follow)
 
-    def shown(self, sample: Sample) -> Shown:
+    def shown(self, sample: Sample) -> _Shown:
         """Points followed through the sample's sequence, or points of a coarse grid that only this image has."""
         if sample.sequence and "tracks" in sample.channels:
             return self._of_tracks(sample, self._followed(sample.sequence, sample.sensor))
@@ -46,13 +46,13 @@ class Sights:
         numbers = own * MOST + np.arange(len(found.world)) + 1
         rows = zip(numbers.tolist(), found.world.tolist(), found.colors.tolist(), strict=True)
         points = tuple(Point(number, place, color, [(own, k)]) for k, (number, place, color) in enumerate(rows))
-        return Shown(_rows(found.pixels, numbers), points)
+        return _Shown(_rows(found.pixels, numbers), points)
 
-    def _of_tracks(self, sample: Sample, followed: _Followed) -> Shown:
+    def _of_tracks(self, sample: Sample, followed: _Followed) -> _Shown:
         own, rows = followed.images.index(sample.index + 1), sample.channels["tracks"]
         shown = np.flatnonzero(followed.holds[own])
         seen = _rows(positions(sample)[shown], followed.numbers[shown])
-        return Shown(seen, tuple(self._picked(sample, rows, followed)))
+        return _Shown(seen, tuple(self._picked(sample, rows, followed)))
 
     def _picked(self, sample: Sample, rows: NDArray[np.void], followed: _Followed) -> Iterator[Point]:
         """The points picked in this image."""

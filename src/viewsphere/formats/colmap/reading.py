@@ -80,7 +80,7 @@ def read(path: Path, *, keep_going: bool = False) -> ForeignDataset:
 
 
 @dataclass(frozen=True)
-class Model:
+class _Model:
     """A sparse model: its files of cameras and images, lenses by number, images by name, and the splits of listed images."""
 
     cameras: Path
@@ -102,7 +102,7 @@ class Model:
         return self.lenses[image.camera], np.column_stack((rotation.T, -transform(rotation.T, t))), split
 
 
-def read_model(path: Path) -> Model:
+def read_model(path: Path) -> _Model:
     """The sparse model in a folder, its images in the order of their names. Raises StoreError if there is no model."""
     files = next(filter(None, map(_files, (path / "sparse" / "0", path / "sparse", path))), None)
     if files is None:
@@ -119,7 +119,7 @@ def read_model(path: Path) -> Model:
         raise StoreError(f"{folder}: expected a model of COLMAP's; found a file that is cut off") from None
     except MISTAKES as error:
         raise StoreError(f"{folder}: expected a model of COLMAP's; found: {one_line(error)}") from None
-    return Model(cameras_file, images_file, lenses, tuple(images), splits)
+    return _Model(cameras_file, images_file, lenses, tuple(images), splits)
 
 
 def _files(folder: Path) -> tuple[Path, Path] | None:

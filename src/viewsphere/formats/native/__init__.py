@@ -35,7 +35,7 @@ def _refuses(scope: Scope) -> Iterator[str]:
     yield from any_view(scope)
 
 
-def writer(
+def _writer(
     dataset: Dataset, folder: Path, note: Callable[[str], None]
 ) -> AbstractContextManager[Callable[[list[Entry]], None]]:
     """Write `dataset1.json`, and models."""
@@ -44,21 +44,21 @@ def writer(
     return writer(dataset, folder, note)
 
 
-def preparer(dataset: Dataset, folder: Path) -> Callable[[Sample], list[Entry]]:
+def _preparer(dataset: Dataset, folder: Path) -> Callable[[Sample], list[Entry]]:
     """Puts a sample's picture, masks and depth in place, and makes its entries of `dataset1.json`."""
     from viewsphere.formats.native.writing import preparer
 
     return preparer(dataset, folder)
 
 
-def verify(dataset: Dataset, folder: Path, sampled: Collection[int]) -> Iterator[Remark]:
+def _verify(dataset: Dataset, folder: Path, sampled: Collection[int]) -> Iterator[Remark]:
     """Every fault of an export."""
     from viewsphere.formats.native.writing import verify
 
     return verify(dataset, folder, sampled)
 
 
-def read(path: Path, *, keep_going: bool = False) -> ForeignDataset:
+def _read(path: Path, *, keep_going: bool = False) -> ForeignDataset:
     """A data set in the layout of the paper's own tool."""
     from viewsphere.formats.native.reading import read
 
@@ -70,8 +70,8 @@ FORMAT = FormatSpec(
     holds=("poses", "3D boxes", "masks", "depth"),
     read_by=("any JSON reader",),
     refuses=_refuses,
-    writer=writer,
-    preparer=preparer,
-    verify=verify,
-    read=read,
+    writer=_writer,
+    preparer=_preparer,
+    verify=_verify,
+    read=_read,
 )

@@ -103,7 +103,7 @@ MILLIMETRE = 0.001
 POINT = np.dtype([("x", "<f4"), ("y", "<f4"), ("z", "<f4"), ("red", "u1"), ("green", "u1"), ("blue", "u1")])
 
 
-class Options(Frozen):
+class _Options(Frozen):
     """The program that reads the export, and the pixels used for training."""
 
     kind: Literal["nerfstudio", "instant-ngp", "nerf-synthetic"] = Field(
@@ -112,13 +112,13 @@ class Options(Frozen):
     masks: bool = Field(default=False, description="masks of the objects, as nerfstudio leaves out what is around them")
 
 
-def _needs(options: Options) -> tuple[str, ...]:
+def _needs(options: _Options) -> tuple[str, ...]:
     """Depth and objects on request."""
     depth = () if options.kind == SYNTHETIC else ("depth",)
     return (*depth, "instances") if options.masks else depth
 
 
-def _refuses(scope: Scope, options: Options) -> Iterator[str]:
+def _refuses(scope: Scope, options: _Options) -> Iterator[str]:
     """Reasons to refuse: unknown cameras, and lenses that the files cannot express."""
     if options.masks and options.kind != "nerfstudio":
         yield f"expected masks with kind nerfstudio; found {options.kind}"
@@ -131,10 +131,10 @@ def _refuses(scope: Scope, options: Options) -> Iterator[str]:
         yield f"expected lenses of one model; found {' and '.join(sorted(models))}"
 
 
-class Nerfstudio(Tree):
+class _Nerfstudio(Tree):
     """A folder for each world."""
 
-    def __init__(self, dataset: Dataset, options: Options) -> None:
+    def __init__(self, dataset: Dataset, options: _Options) -> None:
         super().__init__(dataset)
         self._options, self._kind = options, options.kind
         self._rigs = Rigs(dataset)
@@ -200,14 +200,14 @@ def _points(path: str, sample: Sample) -> Piece:
     return Piece(path, rows.tobytes(), count=len(rows))
 
 
-preparer, writer, verify = functions(Nerfstudio)
+preparer, writer, verify = functions(_Nerfstudio)
 
 
 FORMAT = FormatSpec(
     about=__doc__,
     holds=("cameras", "poses", "depth", "masks", "points"),
     read_by=("nerfstudio", "instant-ngp", "NeRF", "Gaussian splatting"),
-    options=Options,
+    options=_Options,
     channels=("rgb",),
     names_credits=False,
     needs=_needs,

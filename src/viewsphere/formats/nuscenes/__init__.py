@@ -76,7 +76,7 @@ def _refuses(scope: Scope, options: Options) -> Iterator[str]:
         yield from alike("sensors", list(zip(names, channels_of(scope.rig), strict=True)))
 
 
-class NuScenes(Tree):
+class _NuScenes(Tree):
     """The tables and files of a version."""
 
     def __init__(self, dataset: Dataset, options: Options) -> None:
@@ -140,7 +140,7 @@ class NuScenes(Tree):
         return self.dataset.sample_at(row.key, index - row.first)
 
 
-preparer, writer, verify = functions(NuScenes)
+preparer, writer, verify = functions(_NuScenes)
 
 
 FORMAT = FormatSpec(

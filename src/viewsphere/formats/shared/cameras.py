@@ -124,7 +124,7 @@ def measured_png(sample: Sample, metres: float) -> Coded:
 
 
 @dataclass(frozen=True, eq=False)
-class Points:
+class _Points:
     """Points of a picture: their pixels (N, 2), their positions in the world (N, 3), metres, and their colours (N, 3) uint8."""
 
     pixels: Float
@@ -132,7 +132,7 @@ class Points:
     colors: NDArray[np.uint8]
 
 
-def points_of(sample: Sample) -> Points:
+def points_of(sample: Sample) -> _Points:
     """The points that pixels of a coarse grid show, by the channel `depth`."""
     camera = sample.camera
     step = max(1, math.ceil(math.sqrt(camera.width * camera.height / POINTS)))
@@ -142,4 +142,4 @@ def points_of(sample: Sample) -> Points:
     rows, columns, rays, depth = rows[seen], columns[seen], rays[seen], depth[seen]
     places = rays * (depth / rays[:, 2])[:, None]
     pixels = np.column_stack((columns, rows)) + 0.5
-    return Points(pixels, transform(camera.R.T, places - camera.t), sample.picture[rows, columns, :3])
+    return _Points(pixels, transform(camera.R.T, places - camera.t), sample.picture[rows, columns, :3])

@@ -48,7 +48,7 @@ CLIPS, SEQUENCES = 4, 2
 
 
 @dataclass(frozen=True, eq=False)
-class Clip:
+class _Clip:
     """Some instants of a sequence: the clip's path without an ending, its number from 1, and the pictures. Also, for each
     picture, the indices of the 24 joints among the person's points, and the camera's position in the clip's world, (3,)
     float32.
@@ -109,10 +109,10 @@ class Surreal(Tree):
                     yield File(f"{clip.path}_info.mat", mat(**self._info(clip)))
                     yield File(f"{clip.path}.mp4", Coded(start.index, f"{clip.path}.mp4", partial(_film, clip)))
 
-    def _clip_of(self, sample: Sample) -> Clip:
+    def _clip_of(self, sample: Sample) -> _Clip:
         return self._clip(scene(sample), sample.sensor, sample.instant // MOST)
 
-    def _made(self, sequence: str, sensor: str, number: int) -> Clip:
+    def _made(self, sequence: str, sensor: str, number: int) -> _Clip:
         """A clip. Raises UserError for a clip that SURREAL cannot hold."""
         samples = tuple(one for one in self._sequence(sequence, sensor) if one.instant // MOST == number)
         first = samples[0]
@@ -123,7 +123,7 @@ class Surreal(Tree):
         distance = float(_person(first).keypoints3d_camera[own[0][0], 2])
         place = np.array([distance, -first.camera.center[2], 0.0], np.float32)
         path = f"{first.split or 'all'}/run0/{sequence}/{sequence}_c{number + 1:04d}"
-        return Clip(path, number + 1, samples, tuple(own), place)
+        return _Clip(path, number + 1, samples, tuple(own), place)
 
     def _strange(self, sample: Sample, first: Sample, place: int) -> str:
         """Return the reason why SURREAL cannot hold a sample; empty if it can."""
@@ -166,7 +166,7 @@ class Surreal(Tree):
             )
         return found
 
-    def _info(self, clip: Clip) -> dict[str, Any]:
+    def _info(self, clip: _Clip) -> dict[str, Any]:
         first, places = clip.samples[0], clip.joints3d
         pixels = _projected(first.camera.K, places.astype(np.float64) - clip.place.astype(np.float64)[:, None, None])
         backgrounds = [self._background(sample) for sample in clip.samples]
@@ -196,7 +196,7 @@ def film_encoder() -> Encoder:
     return encoder("format surreal", "")
 
 
-def _film(clip: Clip) -> bytes:
+def _film(clip: _Clip) -> bytes:
     """The video of a clip. It reads copies of the samples, so that no picture stays in memory."""
     times = [sample.time for sample in clip.samples]
     steps: Sequence[float] = np.diff(times).tolist() or [1 / RATE]

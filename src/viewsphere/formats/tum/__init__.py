@@ -57,7 +57,7 @@ MOST = 5
 """Greatest number of a lens' coefficients."""
 
 
-class Options(Frozen):
+class _Options(Frozen):
     """The benchmark whose sequences the export resembles."""
 
     kind: Literal["tum", "icl-nuim"] = Field(
@@ -65,7 +65,7 @@ class Options(Frozen):
     )
 
 
-def _refuses(scope: Scope, options: Options) -> Iterator[str]:
+def _refuses(scope: Scope, options: _Options) -> Iterator[str]:
     """Reasons to refuse: lenses that a line of numbers cannot hold."""
     yield from known_cameras(scope)
     yield from no_skew(scope)
@@ -76,10 +76,10 @@ def _refuses(scope: Scope, options: Options) -> Iterator[str]:
             yield f"expected lenses of k1 k2 p1 p2 k3; found another of {name}"
 
 
-class Tum(Tree):
+class _Tum(Tree):
     """A folder for each sensor of each world."""
 
-    def __init__(self, dataset: Dataset, options: Options) -> None:
+    def __init__(self, dataset: Dataset, options: _Options) -> None:
         super().__init__(dataset)
         self._mirrored = options.kind == "icl-nuim"
         self._rigs = Rigs(dataset)
@@ -140,14 +140,14 @@ def _mirrored(pose: NDArray[np.float64]) -> NDArray[np.float64]:
     return pose[[0, 2, 1, 3]] * (1.0, -1.0, 1.0, 1.0)
 
 
-preparer, writer, verify = functions(Tum)
+preparer, writer, verify = functions(_Tum)
 
 
 FORMAT = FormatSpec(
     about=__doc__,
     holds=("depth", "trajectories"),
     read_by=("TUM's RGB-D tools", "SLAM systems", "evo"),
-    options=Options,
+    options=_Options,
     channels=("rgb", "depth"),
     names_credits=False,
     refuses=_refuses,

@@ -95,7 +95,7 @@ def refuses(scope: Scope, options: Options) -> Iterator[str]:
     yield from refusals.plain_names(scope, r"[^\s:]+", "without spaces and :")
 
 
-class VKitti(Tree):
+class _VKitti(Tree):
     """The tree of a version."""
 
     def __init__(self, dataset: Dataset, options: Options) -> None:
@@ -169,7 +169,7 @@ class VKitti(Tree):
         return sample.instant < instants(self.dataset, sample) - 1
 
 
-preparer, writer, verify = functions(VKitti)
+preparer, writer, verify = functions(_VKitti)
 
 
 FORMAT = FormatSpec(

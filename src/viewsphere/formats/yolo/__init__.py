@@ -27,7 +27,7 @@ from viewsphere.formats.yolo.writing import Options, Yolo
 from viewsphere.plugins.format import FormatSpec
 
 
-def needs(options: Options) -> tuple[str, ...]:
+def _needs(options: Options) -> tuple[str, ...]:
     """Labels on request."""
     return {"pose": ("keypoints",), "obb": ("obb",)}.get(options.task, ())
 
@@ -42,7 +42,7 @@ FORMAT = FormatSpec(
     options=Options,
     channels=("rgb",),
     names_credits=False,
-    needs=needs,
+    needs=_needs,
     writer=writer,
     preparer=preparer,
     verify=verify,

@@ -11,42 +11,42 @@ SLACK = 1e-9
 
 
 @inner
-def separated(p, q, r, reach):
+def _separated(p, q, r, reach):
     """Return whether the range of three values is disjoint from the interval [-reach, reach]."""
     return min(p, q, r) > reach or max(p, q, r) < -reach
 
 
 @inner
-def edge_apart(s, t, au, av, bu, bv, cu, cv):
+def _edge_apart(s, t, au, av, bu, bv, cu, cv):
     """Return whether an edge (s, t) separates a triangle from the square around 0, as seen along an axis."""
-    return separated(s * av - t * au, s * bv - t * bu, s * cv - t * cu, 0.5 * (abs(s) + abs(t)))
+    return _separated(s * av - t * au, s * bv - t * bu, s * cv - t * cu, 0.5 * (abs(s) + abs(t)))
 
 
 @inner
-def edges_apart(au, av, bu, bv, cu, cv):
+def _edges_apart(au, av, bu, bv, cu, cv):
     """Return whether any edge of a triangle separates it from the square around 0, as seen along an axis."""
     return (
-        edge_apart(bu - au, bv - av, au, av, bu, bv, cu, cv)
-        or edge_apart(cu - bu, cv - bv, au, av, bu, bv, cu, cv)
-        or edge_apart(au - cu, av - cv, au, av, bu, bv, cu, cv)
+        _edge_apart(bu - au, bv - av, au, av, bu, bv, cu, cv)
+        or _edge_apart(cu - bu, cv - bv, au, av, bu, bv, cu, cv)
+        or _edge_apart(au - cu, av - cv, au, av, bu, bv, cu, cv)
     )
 
 
 @inner
-def extent(points, triangles, t, axis):
+def _extent(points, triangles, t, axis):
     """Return the begin and the end of a triangle along an axis."""
     p, q, r = points[triangles[t, 0], axis], points[triangles[t, 1], axis], points[triangles[t, 2], axis]
     return min(p, q, r), max(p, q, r)
 
 
 @inner
-def cells(low, high, count):
+def _cells(low, high, count):
     """The cells, in a grid with this many, that an extent overlaps."""
     return range(math.floor(max(low, 0.0)), math.floor(min(high, count - 1.0)) + 1)
 
 
 @inner
-def normal_of(points, triangles, t, u, v):
+def _normal_of(points, triangles, t, u, v):
     """The component of a triangle's normal along the axis after u and v, scaled by twice the triangle's area."""
     i, j, k = triangles[t, 0], triangles[t, 1], triangles[t, 2]
     p, q = points[j, u] - points[i, u], points[j, v] - points[i, v]
@@ -55,34 +55,34 @@ def normal_of(points, triangles, t, u, v):
 
 
 @inner
-def columns(points, triangles, t, w, owner, filled, value):
+def _columns(points, triangles, t, w, owner, filled, value):
     """`touch` for one triangle, in columns along axis w."""
     u, v = (w + 1) % 3, (w + 2) % 3
     a, b, c = triangles[t, 0], triangles[t, 1], triangles[t, 2]
-    low_u, high_u = extent(points, triangles, t, u)
-    low_v, high_v = extent(points, triangles, t, v)
-    low_w, high_w = extent(points, triangles, t, w)
+    low_u, high_u = _extent(points, triangles, t, u)
+    low_v, high_v = _extent(points, triangles, t, v)
+    low_w, high_w = _extent(points, triangles, t, w)
     if high_w < 0.0 or low_w >= owner.shape[w]:
         return
-    nu, nv = normal_of(points, triangles, t, v, w), normal_of(points, triangles, t, w, u)
-    nw = normal_of(points, triangles, t, u, v)
-    for i in cells(low_u, high_u, owner.shape[u]):
+    nu, nv = _normal_of(points, triangles, t, v, w), _normal_of(points, triangles, t, w, u)
+    nw = _normal_of(points, triangles, t, u, v)
+    for i in _cells(low_u, high_u, owner.shape[u]):
         x = i + 0.5
         au, bu, cu = points[a, u] - x, points[b, u] - x, points[c, u] - x
-        for j in cells(low_v, high_v, owner.shape[v]):
+        for j in _cells(low_v, high_v, owner.shape[v]):
             y = j + 0.5
             av, bv, cv = points[a, v] - y, points[b, v] - y, points[c, v] - y
-            if edges_apart(au, av, bu, bv, cu, cv):
+            if _edges_apart(au, av, bu, bv, cu, cv):
                 continue
             first, last = low_w, high_w
             if nw != 0.0:
                 middle = points[a, w] + (au * nu + av * nv) / nw
                 reach = 0.5 * (abs(nu) + abs(nv)) / abs(nw) + SLACK * (1.0 + abs(middle))
                 first, last = max(first, middle - reach), min(last, middle + reach)
-            for k in cells(first, last, owner.shape[w]):
+            for k in _cells(first, last, owner.shape[w]):
                 z = k + 0.5
                 aw, bw, cw = points[a, w] - z, points[b, w] - z, points[c, w] - z
-                if edges_apart(av, aw, bv, bw, cv, cw) or edges_apart(aw, au, bw, bu, cw, cu):
+                if _edges_apart(av, aw, bv, bw, cv, cw) or _edges_apart(aw, au, bw, bu, cw, cu):
                     continue
                 cell = (i, j, k) if w == 2 else ((k, i, j) if w == 0 else (j, k, i))
                 if owner[cell] < 0:
@@ -100,15 +100,15 @@ def touch(points, triangles, rows, owner, filled, value):
     triangle bound each column.
     """
     for t in rows:
-        x = abs(normal_of(points, triangles, t, 1, 2))
-        y = abs(normal_of(points, triangles, t, 2, 0))
-        z = abs(normal_of(points, triangles, t, 0, 1))
+        x = abs(_normal_of(points, triangles, t, 1, 2))
+        y = abs(_normal_of(points, triangles, t, 2, 0))
+        z = abs(_normal_of(points, triangles, t, 0, 1))
         w = 2 if z >= x and z >= y else (1 if y >= x else 0)
-        columns(points, triangles, t, w, owner, filled, value)
+        _columns(points, triangles, t, w, owner, filled, value)
 
 
 @inner
-def turns(px, py, qx, qy, x, y):
+def _turns(px, py, qx, qy, x, y):
     """1 if the edge from p to q passes right of a point upwards, -1 if downwards, otherwise 0. Two triangles that share an edge
     always get opposite values, because both compute the same expression.
     """
@@ -122,18 +122,18 @@ def turns(px, py, qx, qy, x, y):
 
 
 @inner
-def around(points, triangles, t, u, v, x, y):
+def _around(points, triangles, t, u, v, x, y):
     """Return the winding number of a triangle's edges around a point of the plane of axes u and v: 1, -1 or 0."""
     i, j, k = triangles[t, 0], triangles[t, 1], triangles[t, 2]
     return (
-        turns(points[i, u], points[i, v], points[j, u], points[j, v], x, y)
-        + turns(points[j, u], points[j, v], points[k, u], points[k, v], x, y)
-        + turns(points[k, u], points[k, v], points[i, u], points[i, v], x, y)
+        _turns(points[i, u], points[i, v], points[j, u], points[j, v], x, y)
+        + _turns(points[j, u], points[j, v], points[k, u], points[k, v], x, y)
+        + _turns(points[k, u], points[k, v], points[i, u], points[i, v], x, y)
     )
 
 
 @inner
-def crossing(points, triangles, t, u, v, w, x, y):
+def _crossing(points, triangles, t, u, v, w, x, y):
     """Return the coordinate where a line along axis w crosses a triangle whose projection contains the line's point.
 
     x, y: the line's point in the plane of axes u and v.
@@ -151,7 +151,7 @@ def crossing(points, triangles, t, u, v, w, x, y):
 
 
 @inner
-def span(points, triangles, t, axis, count):
+def _span(points, triangles, t, axis, count):
     """The cells [first, stop) along an axis whose centres may be inside a triangle's extent."""
     p, q, r = points[triangles[t, 0], axis], points[triangles[t, 1], axis], points[triangles[t, 2], axis]
     first, stop = max(math.ceil(min(p, q, r) - 0.5), 0.0), min(math.floor(max(p, q, r) - 0.5) + 1.0, float(count))
@@ -166,13 +166,13 @@ def wind(points, triangles, rows, winding):
     crossing of a triangle of these rows.
     """
     for t in rows:
-        x0, x1 = span(points, triangles, t, 0, winding.shape[0])
-        y0, y1 = span(points, triangles, t, 1, winding.shape[1])
+        x0, x1 = _span(points, triangles, t, 0, winding.shape[0])
+        y0, y1 = _span(points, triangles, t, 1, winding.shape[1])
         for i in range(x0, x1):
             for j in range(y0, y1):
-                n = around(points, triangles, t, 0, 1, i + 0.5, j + 0.5)
+                n = _around(points, triangles, t, 0, 1, i + 0.5, j + 0.5)
                 if n != 0:
-                    at = math.floor(crossing(points, triangles, t, 0, 1, 2, i + 0.5, j + 0.5) + 0.5)
+                    at = math.floor(_crossing(points, triangles, t, 0, 1, 2, i + 0.5, j + 0.5) + 0.5)
                     if at < winding.shape[2]:
                         winding[i, j, int(max(at, 0.0))] += n
 
@@ -200,12 +200,12 @@ def heights(points, triangles, rows, lowest, highest):
     lines go through the cells' centres.
     """
     for t in rows:
-        x0, x1 = span(points, triangles, t, 0, lowest.shape[0])
-        z0, z1 = span(points, triangles, t, 2, lowest.shape[1])
+        x0, x1 = _span(points, triangles, t, 0, lowest.shape[0])
+        z0, z1 = _span(points, triangles, t, 2, lowest.shape[1])
         for i in range(x0, x1):
             for k in range(z0, z1):
-                if around(points, triangles, t, 0, 2, i + 0.5, k + 0.5) != 0:
-                    at = crossing(points, triangles, t, 0, 2, 1, i + 0.5, k + 0.5)
+                if _around(points, triangles, t, 0, 2, i + 0.5, k + 0.5) != 0:
+                    at = _crossing(points, triangles, t, 0, 2, 1, i + 0.5, k + 0.5)
                     lowest[i, k], highest[i, k] = min(lowest[i, k], at), max(highest[i, k], at)
 
 

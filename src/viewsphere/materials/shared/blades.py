@@ -11,7 +11,7 @@ from viewsphere.materials.shared.kernels_noise import lay_strokes
 from viewsphere.materials.shared.surface import Map
 
 
-class Strokes(NamedTuple):
+class _Strokes(NamedTuple):
     """Height from 0 (no stroke) to 1; the number of the stroke on top, -1 for none; the position along it as a share of its
     length, negative on its shaded side.
     """
@@ -32,7 +32,7 @@ def strokes(
     width: tuple[float, float],
     bend: float,
     rng: np.random.Generator,
-) -> Strokes:
+) -> _Strokes:
     """A number of bent strokes, each in its own direction; ranges of lengths and widths are shares of the square.
 
     `bend` is the sideways shift of a stroke's tip, as a share of its length.
@@ -44,7 +44,7 @@ def strokes(
     steps = max(int(length[1] * size * 1.1), 2)
     share = ((np.arange(steps) + 0.5) / steps)[None, :, None]
     path = (heading[:, None] + 2 * share * aside[:, None]) * (long / steps)[:, None, None]
-    maps = Strokes(*(np.zeros((size, size), np.float32) for _ in range(3)))
+    maps = _Strokes(*(np.zeros((size, size), np.float32) for _ in range(3)))
     maps.number.fill(-1)
     wide = np.maximum((width[0] + (width[1] - width[0]) * u[5]) * size, 1.0)
     lay_strokes(*maps, (u[:2].T * size).astype(np.float32), path.astype(np.float32), wide.astype(np.float32))

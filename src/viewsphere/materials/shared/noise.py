@@ -29,7 +29,7 @@ def noise(size: int, cells: Cells, seed: int, octaves: int = 1, gain: float = 0.
     return out
 
 
-class CellMaps(NamedTuple):
+class _CellMaps(NamedTuple):
     """Distance to the nearest and second nearest point, in cells, and a number, 0 up to 1, of each cell."""
 
     nearest: Map
@@ -42,9 +42,9 @@ class CellMaps(NamedTuple):
         return self.second - self.nearest
 
 
-def cells(size: int, count: Cells, seed: int, jitter: float = 1.0) -> CellMaps:
+def cells(size: int, count: Cells, seed: int, jitter: float = 1.0) -> _CellMaps:
     """Irregular cells about one point in each square of a lattice; jitter 0: the lattice's squares themselves."""
-    maps = CellMaps(*(np.empty((size, size), np.float32) for _ in range(3)))
+    maps = _CellMaps(*(np.empty((size, size), np.float32) for _ in range(3)))
     find_cells(*maps, *((count, count) if isinstance(count, int) else count), jitter, seed)
     return maps
 

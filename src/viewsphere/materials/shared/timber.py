@@ -49,14 +49,14 @@ def draw_timber(rng: np.random.Generator) -> Timber:
     )
 
 
-class Grain(NamedTuple):
+class _Grain(NamedTuple):
     """The lateness of the wood, about 0 to 1, which darkens it, and the depth of its pores, 0 to 1."""
 
     late: Map
     pores: Map
 
 
-def grain(size: int, metres: float, boards: Courses, timber: Timber, seed: int) -> Grain:
+def grain(size: int, metres: float, boards: Courses, timber: Timber, seed: int) -> _Grain:
     """The grain along u of boards, each from another place in another trunk."""
     rng = np.random.default_rng(seed)
     draws = rng.random((4, boards.count))
@@ -77,4 +77,4 @@ def grain(size: int, metres: float, boards: Courses, timber: Timber, seed: int) 
     open_ = cells(size, (max(round(metres / 0.018), 2), max(round(metres / 0.0022), 2)), seed + 6)
     pores = smooth(0.30, 0.12, open_.nearest) * (open_.chance < 0.5 * (0.35 + 0.65 * (1 - ring))) * np.float32(timber.pores)
     late = 0.5 + timber.rings * (ring - 0.45) + 0.30 * fibre + 0.22 * cloud
-    return Grain(late.astype(np.float32), pores.astype(np.float32))
+    return _Grain(late.astype(np.float32), pores.astype(np.float32))

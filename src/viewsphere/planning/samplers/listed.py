@@ -74,7 +74,7 @@ def _cast(context: SamplingContext, subject: str, pose: int | None) -> tuple[Mod
     return tuple(context.spec(listed_object.model) for listed_object in _shots(context)[subject].said.objects)
 
 
-def split(context: SamplingContext, subject: str, pose: int) -> str:
+def _split(context: SamplingContext, subject: str, pose: int) -> str:
     """The shot's own split, else one drawn from its name."""
     if context.recipe.splits.by == "scene":
         return context.dealt_splits[subject]
@@ -86,14 +86,14 @@ def _standing(context: SamplingContext, subject: str, box_of: BoxOf) -> Iterator
     return iter(())
 
 
-def shot(context: SamplingContext, subject: str, poses: Sequence[int], box_of: BoxOf, key: str, first: int) -> Shot:
+def _shot(context: SamplingContext, subject: str, poses: Sequence[int], box_of: BoxOf, key: str, first: int) -> Shot:
     """The shot with its models at the file's poses, their surroundings, and its camera."""
     (pose,) = poses
     things = _things(context, _shots(context)[subject])
     if context.composition is not None:
         things = context.composition.things(subject, things, context.scene_pose(pose), box_of)
     view, number = context.view(context.pose_list, pose), first // len(context.rig.sensors)
-    now = context.instant(subject, view, view.target, (0.0, 0.0, 0.0), split(context, subject, pose), number)
+    now = context.instant(subject, view, view.target, (0.0, 0.0, 0.0), _split(context, subject, pose), number)
     scene = context.scene(subject, context.pose_list.name(pose))
     things, lens = context.repainted(things, subject, pose), now.intrinsics
     if context.own_rig is not None or lens is None:
@@ -160,8 +160,8 @@ SAMPLER = SamplerSpec(
     blocks=_blocks,
     most_objects=_most_objects,
     cast=_cast,
-    split=split,
+    split=_split,
     standing=_standing,
-    shot=shot,
+    shot=_shot,
     of_any_size=True,
 )

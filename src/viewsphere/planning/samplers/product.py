@@ -44,7 +44,7 @@ def _factors(context: SamplingContext) -> str:
     return f"{quantity(context.models, 'model')} x {quantity(counts.pop(), 'time step')} x {poses}"
 
 
-def blocks(context: SamplingContext) -> tuple[Block, ...]:
+def _blocks(context: SamplingContext) -> tuple[Block, ...]:
     """Return the blocks of models and their poses, time step by time step."""
     blocks: list[Block] = []
     for schedule, members in groupby(range(context.models), lambda model: context.schedules[model]):
@@ -179,7 +179,7 @@ def _scene(context: SamplingContext, subject: str, pose: str, run: Run) -> Scene
 SAMPLER = SamplerSpec(
     subjects=_subjects,
     factors=_factors,
-    blocks=blocks,
+    blocks=_blocks,
     most_objects=_most_objects,
     cast=_cast,
     split=_split,

@@ -60,7 +60,7 @@ FLOOR = Floor(height=0.0, is_fixed=True)
 """The floor of all sequences: moving things may be above or below it."""
 
 
-def subjects(recipe: Recipe, specs: Sequence[ModelSpec]) -> tuple[str, ...]:
+def _subjects(recipe: Recipe, specs: Sequence[ModelSpec]) -> tuple[str, ...]:
     """The models' keys, or the scenes' names."""
     if is_animated(recipe):
         raise RecipeError(
@@ -196,7 +196,7 @@ def _taken(context: SamplingContext) -> dict[int, list[str]]:
 
 
 SAMPLER = SamplerSpec(
-    subjects=subjects,
+    subjects=_subjects,
     factors=_factors,
     blocks=_blocks,
     most_objects=_most_objects,

@@ -17,7 +17,7 @@ FLAKE = 10 ** (1 / 3)
 """Ratio of a flake's width to that of its melted drop."""
 
 
-class Sizes(NamedTuple):
+class _Sizes(NamedTuple):
     """N(D) = most exp(-slope D) per cubic metre and millimetre of diameter D; the visible width is `wide` times D."""
 
     most: float
@@ -25,11 +25,11 @@ class Sizes(NamedTuple):
     wide: float
 
 
-def sizes(falling: Falling) -> Sizes:
+def sizes(falling: Falling) -> _Sizes:
     """The size distribution of rain or snow."""
     if isinstance(falling, Rain):
-        return Sizes(8000.0, 4.1 * falling.rate**-0.21, 1.0)
-    return Sizes(3800.0 * falling.rate**-0.87, 2.55 * falling.rate**-0.48, FLAKE)
+        return _Sizes(8000.0, 4.1 * falling.rate**-0.21, 1.0)
+    return _Sizes(3800.0 * falling.rate**-0.87, 2.55 * falling.rate**-0.48, FLAKE)
 
 
 def extinction(falling: Falling) -> float:

@@ -51,7 +51,7 @@ ALONG = 8
 
 
 @dataclass(frozen=True)
-class SensorFacts:
+class _SensorFacts:
     """A sensor in words: `fov_deg` across and down; `position` in metres and `rotation` in degrees as recipes write them."""
 
     name: str
@@ -73,18 +73,18 @@ def recipe_rig(recipe: Recipe) -> Rig:
         return rig_of(recipe, own) or Rig.single(own)
 
 
-def sensor_facts(rig: Rig) -> tuple[SensorFacts, ...]:
+def sensor_facts(rig: Rig) -> tuple[_SensorFacts, ...]:
     """Return the facts about each sensor."""
     colors = list(COLORS)
     return tuple(_facts(sensor, colors[i % len(colors)]) for i, sensor in enumerate(rig.sensors))
 
 
-def _facts(sensor: Sensor, color: str) -> SensorFacts:
+def _facts(sensor: Sensor, color: str) -> _SensorFacts:
     pose, own = np.array(sensor.rig_from_sensor), sensor.intrinsics
     x, y, z = (round(float(v), 9) + 0.0 for v in pose[:3, 3])
     distortion = None if own.lens.is_linear else own.lens.name
     size = own.width, own.height
-    return SensorFacts(
+    return _SensorFacts(
         sensor.name, color, size, own.lens.field_of_view(), (x, y, z), _angles(pose), distortion, sensor.channels
     )
 

@@ -42,7 +42,7 @@ Take = Callable[[Sequence[int], int], Shot]
 """Makes a shot from the try of each frame and a redraw number. The scene uses the first redraw from it on with enough room."""
 
 
-class Source(Protocol):
+class _Source(Protocol):
     """A plan, or a part of a data set, that provides shots."""
 
     def shot(self, row: Row, box_of: BoxOf, redraws: Sequence[int] = (), redraw: int = 0) -> Shot:
@@ -59,7 +59,7 @@ class Framing:
     """Composes the shots of a plan, or of a part of a data set (`source`), so that they fit."""
 
     plan: Plan
-    source: Source
+    source: _Source
     stages: Stages
     box_of: BoxOf
     _scenes: dict[Row, int] = field(default_factory=dict[Row, int])
@@ -80,7 +80,7 @@ class Framing:
             self._scenes[whole] = self._fitting(self._taker(self.plan, whole), 0, self.plan.draws, False).redraw
         return self._fitting(take, self._scenes[whole], self._scenes[whole] + 1)
 
-    def _taker(self, source: Source, row: Row) -> Take:
+    def _taker(self, source: _Source, row: Row) -> Take:
         return lambda redraws, redraw: source.shot(row, self.box_of, redraws, redraw)
 
     def _fitting(self, take: Take, redraw: int, stop: int, is_judged: bool = True) -> Shot:

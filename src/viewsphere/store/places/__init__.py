@@ -1,6 +1,6 @@
 """The places of data sets: a disk, or a URL. Reading is the same for both (`viewsphere.urls`).
 
-Writing uses a `Place`: a folder is made in a scratch folder of this machine, and moved to its place when it is complete.
+Writing uses a place: a folder is made in a scratch folder of this machine, and moved to its place when it is complete.
 A disk does that by a rename. A URL has no rename: files are uploaded, and the file that marks the folder as complete comes
 last. A folder without this file counts as absent, and is made again over its remains. No run detects others at a URL: runs
 that make the same shot write the same bytes. Files of the store are never changed, so reading needs no locks.
@@ -16,7 +16,7 @@ from typing import Protocol
 from viewsphere.urls import RemotePath
 
 
-class Place(Protocol):
+class _Place(Protocol):
     """Writes a data set below its root."""
 
     def make(self) -> None:
@@ -76,7 +76,7 @@ class Place(Protocol):
         ...
 
 
-def place_of(root: Path) -> Place:
+def place_of(root: Path) -> _Place:
     """Return the writer for this root."""
     if isinstance(root, RemotePath):
         from viewsphere.store.places.remote import Remote

@@ -42,7 +42,7 @@ RUN = "run.json"
 
 
 @dataclass(frozen=True)
-class Gap:
+class _Gap:
     """The missing rows of a part, or of the channels that it adds to other parts.
     `first`: the first missing row.
     `shots` and `frames`: the numbers of missing shots and frames.
@@ -180,7 +180,7 @@ class Store:
         """Replace the stored plan by one that continues it."""
         self._write_atomically(self.plan_file, plan.to_json())
 
-    def gaps(self, plan: PlanRecord, finished: Sequence[str] | None = None) -> Iterator[Gap]:
+    def gaps(self, plan: PlanRecord, finished: Sequence[str] | None = None) -> Iterator[_Gap]:
         """Yield the gaps of each part and of the channels that it adds, except for rows left out at the user's request.
 
         `finished`: the shots that count as finished, by default all finished ones.
@@ -201,7 +201,7 @@ class Store:
                 if first is None:
                     raise StoreError(f"{self.plan_file}: expected a plan that names each shot once, found one with some twice")
                 lost = frames - sum(there.values())
-                yield Gap(part, is_added, first, shots - len(there), lost, frames)
+                yield _Gap(part, is_added, first, shots - len(there), lost, frames)
 
     def finished(self) -> Iterator[str]:
         """Keys of all finished shots, in no order."""

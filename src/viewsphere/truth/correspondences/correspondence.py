@@ -27,7 +27,7 @@ Real = TypeVar("Real", np.float32, np.float64)
 
 
 @dataclass(frozen=True, eq=False)
-class Deformed:
+class _Deformed:
     """Pixels that show deforming things: their numbers in the picture (n,), and their points in the axes of either camera (n,
     3).
 
@@ -164,7 +164,7 @@ class Match:
         return (self._maps.kinds == kind)[owners][self.visibility.triangle]
 
     @cached_property
-    def _deformed(self) -> Deformed | None:
+    def _deformed(self) -> _Deformed | None:
         if not (self._maps.kinds == OTHER).any():
             return None
         pixel = np.flatnonzero(self._shows(OTHER))
@@ -179,7 +179,7 @@ class Match:
             places.append(transform(view.camera.R, world) + view.camera.t)
             corners.append(view.geometry.corners(chosen))
         is_still = (corners[0] == corners[1]).all(axis=(1, 2)) & self.view.has_camera_of(self.other)
-        return Deformed(pixel, places[0], places[1], is_still)
+        return _Deformed(pixel, places[0], places[1], is_still)
 
     def _write_deformed(self, xy: Float, near: Float, rays: Float | None) -> None:
         assert self._deformed is not None

@@ -73,7 +73,7 @@ class Geometry:
     object_count: int
     ground_z: float | None
     labels: TriangleLabels
-    facing: Facing
+    facing: _Facing
     spare: Spare
 
     @property
@@ -167,7 +167,7 @@ class Geometry:
 
 
 @dataclass(eq=False)
-class Facing:
+class _Facing:
     """The world normals of a scene's vertices and triangles.
 
     The arrays are overwritten when the normals of another instant are requested, so all instants share one of each.
@@ -390,7 +390,7 @@ def _placed(things: tuple[Thing, ...], meshes: tuple[Mesh, ...], label_alpha: fl
         labels=TriangleLabels(
             things[:objects], meshes[:objects], (cache(partial(scenery_classes, things[objects:], meshes[objects:])),)
         ),
-        facing=Facing(),
+        facing=_Facing(),
         spare=Spare(),
     )
     for i in range(len(things)):
@@ -423,7 +423,7 @@ def _stacked(parts: Sequence[Geometry]) -> Geometry:
             tuple(mesh for part in parts for mesh in part.labels.meshes),
             tuple(classes for part in parts for classes in part.labels.classes_behind),
         ),
-        facing=Facing(),
+        facing=_Facing(),
         spare=Spare(),
     )
 
@@ -485,7 +485,7 @@ def _ground(bounds: NDArray[np.float64], floor: Floor | None) -> Geometry:
         object_count=0,
         ground_z=float(corners[0, 2]),
         labels=TriangleLabels((), (), (ground_classes,)),
-        facing=Facing(),
+        facing=_Facing(),
         spare=Spare(),
     )
 

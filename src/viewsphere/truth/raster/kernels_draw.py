@@ -60,7 +60,7 @@ def cells(q, samples, x0, y0, width, height, cell):
 
 
 @inner
-def is_surface(alpha_masks, row, b0, b1, b2):
+def _is_surface(alpha_masks, row, b0, b1, b2):
     """Return whether the point with these barycentrics of cut-out triangle `row` is surface; see `alpha_masks.AlphaMasks`."""
     texels, layout, levels, material, corners = alpha_masks
     c = corners[row]
@@ -100,7 +100,7 @@ def plane(q0, q1, q2):
 
 
 @inner
-def negated(e):
+def _negated(e):
     """The opposite of three coefficients."""
     return -e[0], -e[1], -e[2]
 
@@ -113,7 +113,7 @@ def edges_inside(q0, q1, q2, normal, det, cutout):
     """
     e0, e1, e2 = edge(q1, q2), edge(q2, q0), edge(q0, q1)
     if det < 0.0:
-        e0, e1, e2 = negated(e0), negated(e1), negated(e2)
+        e0, e1, e2 = _negated(e0), _negated(e1), _negated(e2)
     if cutout >= NEVER:
         return e0, e1, e2
     x, y, z = normal[0] / det, normal[1] / det, normal[2] / det
@@ -280,4 +280,4 @@ def _draw_checked(t, q0, q1, q2, box, canvas, bounds, cutout, alpha_masks, neare
 def hits_surface(alpha_masks, cutout, e0, e1, e2):
     """Return whether the triangle is surface at these values of its edge functions: everywhere without a cut-out."""
     total = e0 + e1 + e2
-    return cutout < 0 or (total != 0.0 and is_surface(alpha_masks, cutout, e0 / total, e1 / total, e2 / total))
+    return cutout < 0 or (total != 0.0 and _is_surface(alpha_masks, cutout, e0 / total, e1 / total, e2 / total))

@@ -58,9 +58,9 @@ class SurfacePoints:
         position = np.array([*(body.position for body in self.bodies), -1], np.int32)
         return np.where(self.body >= 0, position[np.maximum(self.body, -1)], self.body)
 
-    def in_view(self, view: View) -> Tracked:
+    def in_view(self, view: View) -> _Tracked:
         """Return the points' places in a view of the same things, at any instant."""
-        return Tracked(self, view)
+        return _Tracked(self, view)
 
     def chosen(self, index: NDArray[np.intp]) -> SurfacePoints:
         """A selection of the points, by their numbers."""
@@ -138,7 +138,7 @@ def points_in_world(places: ArrayLike) -> SurfacePoints:
 
 
 @dataclass(frozen=True, eq=False)
-class Tracked:
+class _Tracked:
     """Points in one view."""
 
     points: SurfacePoints

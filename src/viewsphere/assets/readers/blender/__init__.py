@@ -25,7 +25,7 @@ def _read(folder: ModelFolder) -> tuple[Mesh, FileFacts]:
     return read_via_blender(folder)
 
 
-def frames(folder: ModelFolder, frames: Sequence[int]) -> Iterator[tuple[Mesh, FileFacts]]:
+def _frames(folder: ModelFolder, frames: Sequence[int]) -> Iterator[tuple[Mesh, FileFacts]]:
     """The model at frames of an animation, see `reading.read_frames`."""
     from viewsphere.assets.readers.blender.reading import read_frames
 
@@ -37,7 +37,7 @@ READER = ReaderSpec(
     suffixes=("abc", "blend", "fbx", *USD),
     axes=("+z", "-y"),
     unit="metre, after Blender's own turn and scale",
-    frames=frames,
+    frames=_frames,
     by_blender=True,
     reserves_memory=True,
     first_bytes={b"Kaydara FBX": ("fbx",), b"BLENDER": ("blend",), b"Ogawa": ("abc",)},

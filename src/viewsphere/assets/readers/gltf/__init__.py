@@ -20,14 +20,14 @@ def _read(folder: ModelFolder) -> tuple[Mesh, FileFacts]:
     return read_gltf(folder)
 
 
-def frames(folder: ModelFolder, frames: Sequence[int]) -> Iterator[tuple[Mesh, FileFacts]]:
+def _frames(folder: ModelFolder, frames: Sequence[int]) -> Iterator[tuple[Mesh, FileFacts]]:
     """The model at frames of an animation, see `reading.read_gltf_frames`."""
     from viewsphere.assets.readers.gltf.reading import read_gltf_frames
 
     return read_gltf_frames(folder, frames)
 
 
-def timeline(folder: ModelFolder) -> dict[str, Any]:
+def _timeline(folder: ModelFolder) -> dict[str, Any]:
     """The animations' frames, see `animation.timeline`."""
     from viewsphere.assets.readers.gltf.animation import timeline
     from viewsphere.assets.readers.gltf.document import Document
@@ -40,8 +40,8 @@ READER = ReaderSpec(
     suffixes=("glb", "gltf"),
     axes=("+y", "+z"),
     unit="metre",
-    frames=frames,
-    timeline=timeline,
+    frames=_frames,
+    timeline=_timeline,
     first_bytes={b"glTF": ("glb", "gltf")},
     read=_read,
     modules=("viewsphere.assets.readers.gltf.reading",),

@@ -69,14 +69,14 @@ class _Map:
 
 
 @dataclass(frozen=True)
-class LibraryMaterial:
+class _LibraryMaterial:
     """A material of a library, and whether its statements (`d`, `Tr` below 1, `map_d`) make alpha its opacity."""
 
     material: Material
     states_opacity: bool
 
 
-def read_materials(folder: ModelFolder, libraries: Sequence[Library], wanted: set[str]) -> dict[str, LibraryMaterial]:
+def read_materials(folder: ModelFolder, libraries: Sequence[Library], wanted: set[str]) -> dict[str, _LibraryMaterial]:
     """The wanted materials of these libraries by name; the first definition of a name counts.
 
     `Kd` multiplies `map_Kd`, except a black one, which many exporters write together with a texture. `Ns` (with `map_Ns`)
@@ -106,14 +106,14 @@ class _Builder:
     block: dict[str, str]
     library: Path
 
-    def entry(self) -> LibraryMaterial:
+    def entry(self) -> _LibraryMaterial:
         """The material; a warning names maps that are not read."""
         material = self.material()
         color = self.block.get("map_kd")
         unread = [key for key in self.block if key.startswith(MAPS) and key not in READ and self.block[key] != color]
         if unread:
             self.folder.warn(f"material {self.name!r} has maps that are not read: {', '.join(unread)}")
-        return LibraryMaterial(material, material.base_color[3] < 1.0 or self.opacity_map() is not None)
+        return _LibraryMaterial(material, material.base_color[3] < 1.0 or self.opacity_map() is not None)
 
     def material(self) -> Material:
         color_map = self.map("map_kd")

@@ -33,7 +33,7 @@ MAX_HEADER = 1 << 20
 
 
 @dataclass(frozen=True)
-class Property:
+class _Property:
     """A column of an element: its type, and the type of the count before each list; None for single numbers."""
 
     name: str
@@ -42,12 +42,12 @@ class Property:
 
 
 @dataclass(frozen=True)
-class Element:
+class _Element:
     """An element of a file: a table with a name, rows and columns."""
 
     name: str
     rows: int
-    properties: tuple[Property, ...]
+    properties: tuple[_Property, ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,7 +65,7 @@ Columns = dict[str, "NDArray[np.generic] | Lists"]
 class PlyFile:
     """The content of a file: tables by name, in the order of the file, their columns, and the file's comments."""
 
-    elements: dict[str, Element]
+    elements: dict[str, _Element]
     columns: dict[str, Columns]
     comments: tuple[str, ...]
 
@@ -87,12 +87,12 @@ def read_elements(folder: ModelFolder, data: bytes) -> PlyFile:
     return PlyFile(_by_name(elements), columns, comments)
 
 
-def _by_name(elements: Sequence[Element]) -> dict[str, Element]:
+def _by_name(elements: Sequence[_Element]) -> dict[str, _Element]:
     return {element.name: element for element in reversed(elements)}
 
 
 def _columns(
-    folder: ModelFolder, data: bytes, elements: Sequence[Element], order: str, at: int
+    folder: ModelFolder, data: bytes, elements: Sequence[_Element], order: str, at: int
 ) -> tuple[dict[str, Columns], int]:
     """Columns of all elements, and the number of bytes left."""
     columns: dict[str, Columns] = {}
@@ -102,13 +102,15 @@ def _columns(
     return columns, len(data) - at
 
 
-def _text_columns(folder: ModelFolder, text: bytes, elements: Sequence[Element], before: int) -> tuple[dict[str, Columns], int]:
+def _text_columns(
+    folder: ModelFolder, text: bytes, elements: Sequence[_Element], before: int
+) -> tuple[dict[str, Columns], int]:
     """The equivalent of `_columns` for a text, whose numbers are first converted to a binary file of doubles."""
     doubles = [replace(e, properties=tuple(_as_double(p) for p in e.properties)) for e in elements]
     return _columns(folder, numbers_in(folder, text, before).tobytes(), doubles, "<", 0)
 
 
-def _fitting(folder: ModelFolder, text: bytes, elements: Sequence[Element], before: int) -> tuple[bytes, list[Element]]:
+def _fitting(folder: ModelFolder, text: bytes, elements: Sequence[_Element], before: int) -> tuple[bytes, list[_Element]]:
     """A text and its elements without the surplus numbers of lines that hold more than the header declares.
 
     MeshLab once wrote such lines. In such an element, columns after the last list are unreliable, and are left out, too.
@@ -116,7 +118,7 @@ def _fitting(folder: ModelFolder, text: bytes, elements: Sequence[Element], befo
     lines = [(number, words) for number, line in enumerate(text.splitlines(), before + 1) if (words := line.split())]
     if len(lines) != (promised := sum(element.rows for element in elements)):
         raise folder.error(f"holds {len(lines):,} lines of numbers, its header promises {promised:,}; export the model again")
-    kept: list[Element] = []
+    kept: list[_Element] = []
     rows: list[bytes] = []
     for element in elements:
         part = lines[len(rows) : len(rows) + element.rows]
@@ -125,7 +127,7 @@ def _fitting(folder: ModelFolder, text: bytes, elements: Sequence[Element], befo
     return b"\n".join(rows), kept
 
 
-def _trusted(folder: ModelFolder, element: Element, lines: Sequence[tuple[int, list[bytes]]]) -> Element:
+def _trusted(folder: ModelFolder, element: _Element, lines: Sequence[tuple[int, list[bytes]]]) -> _Element:
     """The element with the columns whose positions in its lines are certain."""
     wrong = next(((number, words) for number, words in lines if _width(element, words) != len(words)), None)
     if wrong is None:
@@ -136,7 +138,7 @@ def _trusted(folder: ModelFolder, element: Element, lines: Sequence[tuple[int, l
     return replace(element, properties=element.properties[: last + 1])
 
 
-def _width(element: Element, words: Sequence[bytes]) -> int:
+def _width(element: _Element, words: Sequence[bytes]) -> int:
     """The number of words in a row whose lists have these lengths."""
     at = 0
     for column in element.properties:
@@ -144,7 +146,7 @@ def _width(element: Element, words: Sequence[bytes]) -> int:
     return at
 
 
-def _as_double(column: Property) -> Property:
+def _as_double(column: _Property) -> _Property:
     return replace(column, type="f8", count=column.count and "f8")
 
 
@@ -160,8 +162,8 @@ def _split(folder: ModelFolder, data: bytes) -> tuple[str, int]:
     return decode(data[: end.start()]), end.end() - (1 if is_mac and end[1] == b"\r\n" else 0)
 
 
-def _header(folder: ModelFolder, text: str) -> tuple[str, list[Element], tuple[str, ...]]:
-    order, elements, comments = None, list[Element](), list[str]()
+def _header(folder: ModelFolder, text: str) -> tuple[str, list[_Element], tuple[str, ...]]:
+    order, elements, comments = None, list[_Element](), list[str]()
     for number, line in enumerate(re.split(r"\r\n|\r|\n", text), 1):
         words = line.split()
         try:
@@ -172,7 +174,7 @@ def _header(folder: ModelFolder, text: str) -> tuple[str, list[Element], tuple[s
             elif words[0] == "format":
                 order = ORDERS[words[1]]
             elif words[0] == "element":
-                elements.append(Element(words[1], int(words[2]), ()))
+                elements.append(_Element(words[1], int(words[2]), ()))
             elif words[0] == "property":
                 elements[-1] = replace(elements[-1], properties=(*elements[-1].properties, _property(words)))
             elif elements:
@@ -186,10 +188,10 @@ def _header(folder: ModelFolder, text: str) -> tuple[str, list[Element], tuple[s
     return order, elements, tuple(comments)
 
 
-def _property(words: list[str]) -> Property:
+def _property(words: list[str]) -> _Property:
     if words[1] == "list":
-        return Property(words[4].lower(), TYPES[words[3]], TYPES[words[2]])
-    return Property(words[2].lower(), TYPES[words[1]])
+        return _Property(words[4].lower(), TYPES[words[3]], TYPES[words[2]])
+    return _Property(words[2].lower(), TYPES[words[1]])
 
 
 @dataclass(frozen=True, eq=False)
@@ -198,7 +200,7 @@ class _Table:
 
     folder: ModelFolder
     data: bytes
-    element: Element
+    element: _Element
     order: str
 
     def read(self, at: int) -> tuple[Columns, int]:
@@ -278,7 +280,7 @@ class _Table:
                 offset += kind.itemsize
         return columns, at
 
-    def _before(self, first: Property) -> int:
+    def _before(self, first: _Property) -> int:
         """Bytes of a row before its first list."""
         properties = self.element.properties
         return sum(self._dtype(p.type).itemsize for p in properties[: properties.index(first)])

@@ -19,7 +19,7 @@ def _read(folder: ModelFolder) -> tuple[Mesh, FileFacts]:
     return read_usd(folder)
 
 
-def timeline(folder: ModelFolder) -> dict[str, Any]:
+def _timeline(folder: ModelFolder) -> dict[str, Any]:
     """The animation's frames, see `animated.timeline`."""
     from viewsphere.assets.readers.usd.animated import timeline
 
@@ -29,7 +29,7 @@ def timeline(folder: ModelFolder) -> dict[str, Any]:
 READER = ReaderSpec(
     about="USD (usd, usda, usdc, usdz)",
     suffixes=("usd", "usda", "usdc", "usdz"),
-    timeline=timeline,
+    timeline=_timeline,
     packages=("pxr",),
     install="viewsphere[usd]",
     reserves_memory=True,

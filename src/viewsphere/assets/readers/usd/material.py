@@ -21,7 +21,7 @@ GREY = 0.18  # and that of diffuseColor
 
 
 @dataclass(frozen=True)
-class Look:
+class _Look:
     """A material, the primvars that its textures read in order of `texcoord`, and the primvar of its vertex colours."""
 
     material: Material
@@ -29,7 +29,7 @@ class Look:
     color: str | None = None
 
 
-UNBOUND = Look(Material(name="default"), ("st",), "displayColor")
+UNBOUND = _Look(Material(name="default"), ("st",), "displayColor")
 """The material for prims without one: white, multiplied by their display colours."""
 
 
@@ -39,9 +39,9 @@ class UsdMaterials:
 
     folder: ModelFolder
     time: Any
-    _looks: dict[str, Look] = field(default_factory=dict[str, Look])
+    _looks: dict[str, _Look] = field(default_factory=dict[str, _Look])
 
-    def look(self, prim: Any) -> Look:
+    def look(self, prim: Any) -> _Look:
         """The look of the material that is bound to a prim."""
         binding = UsdShade.MaterialBindingAPI(prim)
         for purpose in (UsdShade.Tokens.allPurpose, UsdShade.Tokens.preview, UsdShade.Tokens.full):
@@ -53,14 +53,14 @@ class UsdMaterials:
                 return self._looks[path]
         return UNBOUND
 
-    def _read(self, material: Any) -> Look:
+    def _read(self, material: Any) -> _Look:
         name = str(material.GetPrim().GetName())
         for context in ("", "mtlx", "glslfx"):
             surface, _, _ = material.ComputeSurfaceSource(context)
             if surface and surface.GetIdAttr().Get() in SURFACES:
                 return _Surface(self.folder, surface, self.time, name).look()
         self.folder.warn(f"material {name!r} has no UsdPreviewSurface; the prims' display colours take its place")
-        return Look(Material(name=name), (), "displayColor")
+        return _Look(Material(name=name), (), "displayColor")
 
 
 @dataclass(eq=False)
@@ -95,7 +95,7 @@ class _Surface:
         source = producer(self.shader.GetInput("diffuseColor"))
         return None if source is None else source.primvar(self.time, ("UsdPrimvarReader_float3", "UsdPrimvarReader_float4"))
 
-    def look(self) -> Look:
+    def look(self) -> _Look:
         names = "diffuseColor", "opacity", "metallic", "roughness", "normal", "occlusion", "emissiveColor"
         sampled = {name: self.texture(name) for name in names}
         uvs = _primvars(list(sampled.values()))
@@ -106,7 +106,7 @@ class _Surface:
         baker = Baker(self.folder, uvs)
         color = self._vertex_color()
         material = self._material(sampled, baker, is_painted=color is not None)
-        return Look(material, uvs, color)
+        return _Look(material, uvs, color)
 
     def _material(self, sampled: dict[str, Sampled | None], baker: Baker, *, is_painted: bool) -> Material:
         diffuse, opacity = sampled["diffuseColor"], sampled["opacity"]

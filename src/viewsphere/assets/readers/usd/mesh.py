@@ -31,7 +31,7 @@ class Influences:
 
 
 @dataclass(frozen=True, eq=False)
-class Shape:
+class _Shape:
     """A prim's triangles (T, 3) of corners, the point (C,) and the face (C,) of each corner, and its primvars' values by name
     and kind of row.
     """
@@ -51,7 +51,7 @@ class Shape:
         return None if values.shape[1:] != (width,) else _spread(kind, values, self.point, self.face)
 
 
-def read_shape(folder: ModelFolder, prim: Any, time: Any) -> Shape | None:
+def read_shape(folder: ModelFolder, prim: Any, time: Any) -> _Shape | None:
     """The polygons of a mesh or an implicit shape; None if it has none."""
     found = _polygons(folder, prim, time)
     if found is None or not len(found[2]):
@@ -67,7 +67,7 @@ def read_shape(folder: ModelFolder, prim: Any, time: Any) -> Shape | None:
     if kept is not None:
         values = {name: (kind, rows[kept] if kind == "corner" else rows) for name, (kind, rows) in values.items()}
     normals = values.get("normals", ("", np.zeros((0, 0))))
-    return Shape(
+    return _Shape(
         points,
         corners,
         starts,
@@ -164,7 +164,7 @@ def _array(value: Any, kind: type[np.generic], width: int = 0) -> Any:
 
 
 def pieces_of(
-    shape: Shape, material: int, uvs: Sequence[str], color: str | None, influences: Influences | None, triangles: Int
+    shape: _Shape, material: int, uvs: Sequence[str], color: str | None, influences: Influences | None, triangles: Int
 ) -> Primitive:
     """Some of a shape's triangles; `uvs` are the primvars of their texture coordinates, `color` is the primvar of their
     colours.
@@ -191,7 +191,7 @@ def _downwards(uv: Float | None) -> Float | None:
     return None if uv is None else np.column_stack([uv[:, 0], 1.0 - uv[:, 1]])
 
 
-def _colors(shape: Shape, name: str) -> Float | None:
+def _colors(shape: _Shape, name: str) -> Float | None:
     """Linear colours (C, 4) with the opacity that the prim displays."""
     colors, opacity = shape.at_corners(name, 3), shape.at_corners("displayOpacity", 1)
     if colors is None:
@@ -199,7 +199,7 @@ def _colors(shape: Shape, name: str) -> Float | None:
     return np.column_stack([np.clip(colors, 0.0, 1.0), np.ones(len(colors)) if opacity is None else opacity])
 
 
-def by_material(shape: Shape) -> Iterator[tuple[Any, Int]]:
+def by_material(shape: _Shape) -> Iterator[tuple[Any, Int]]:
     """The prim of each material subset, None for the rest, and the triangles of its faces."""
     left = np.ones(len(shape.triangles), bool)
     for prim, faces in shape.subsets:

@@ -31,7 +31,7 @@ Color = tuple[float, float, float]
 
 
 @dataclass(frozen=True, eq=False)
-class Producer:
+class _Producer:
     """The attribute that gives an input its value: a constant, or a shader's output."""
 
     attribute: Any
@@ -58,10 +58,10 @@ class Producer:
         return None if not name else str(name)
 
 
-def producer(entry: Any) -> Producer | None:
+def producer(entry: Any) -> _Producer | None:
     """The source of an input's value, or None."""
     attributes = UsdShade.Utils.GetValueProducingAttributes(entry) if entry else ()
-    return Producer(attributes[0]) if attributes else None
+    return _Producer(attributes[0]) if attributes else None
 
 
 def _constant(shader: Any, name: str, time: Any) -> Any:
@@ -87,7 +87,7 @@ class Sampled:
         return self.channels == channels and all(self.scale[i] == 1 and self.bias[i] == 0 for i in rows)
 
 
-def network_texture(folder: ModelFolder, source: Producer | None, time: Any, what: str) -> Sampled | None:
+def network_texture(folder: ModelFolder, source: _Producer | None, time: Any, what: str) -> Sampled | None:
     """The texture connected to an input; None for constants and, with a warning, for unusable textures."""
     if source is None or not source.is_output:
         return None

@@ -24,7 +24,7 @@ rectangles by the gap, because one side of a rectangle is within 45 degrees of e
 """
 
 
-class Circle(NamedTuple):
+class _Circle(NamedTuple):
     """The middle of a cover, metres; radii of a circle around it and of one within it.
 
     Two covers are apart by a gap if the distance of their middles is `spread` times the sum of the outer radii and the gap.
@@ -38,7 +38,7 @@ class Circle(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Sides:
+class _Sides:
     """A footprint as plain numbers, which compare six times as fast as arrays: centre, radius of the circle around it, axes,
     half sizes.
     """
@@ -74,16 +74,16 @@ class Footprint:
         return False
 
     @cached_property
-    def sides(self) -> Sides:
+    def sides(self) -> _Sides:
         """Its sides, as numbers that are quick to compare."""
         (ax, ay), (bx, by) = self.axes.tolist()
         (x, y), (h, k) = self.center.tolist(), self.half.tolist()
-        return Sides(x, y, math.hypot(h, k), ((ax, ay), (bx, by)), (h, k))
+        return _Sides(x, y, math.hypot(h, k), ((ax, ay), (bx, by)), (h, k))
 
     @cached_property
-    def circle(self) -> Circle:
+    def circle(self) -> _Circle:
         """The circles around and within it."""
-        return Circle(self.sides.x, self.sides.y, self.sides.radius, min(self.sides.half), math.sqrt(FAR))
+        return _Circle(self.sides.x, self.sides.y, self.sides.radius, min(self.sides.half), math.sqrt(FAR))
 
     def contains(self, other: Footprint | Outline) -> bool:
         """Return whether the other footprint is entirely inside this one."""
@@ -118,7 +118,7 @@ class Outline:
         return sides[:, ::-1] * (1, -1) / np.maximum(np.linalg.norm(sides, axis=1, keepdims=True), 1e-12)
 
     @cached_property
-    def circle(self) -> Circle:
+    def circle(self) -> _Circle:
         """The circles around and within it. The widest angle between two sides limits the angle from any direction to the
         nearest normal to half of it.
         """
@@ -128,7 +128,7 @@ class Outline:
         angles = np.sort(np.arctan2(self.axes[:, 1], self.axes[:, 0]) % math.pi)
         widest = float(np.diff(angles, append=angles[0] + math.pi).max())
         x, y = middle.tolist()
-        return Circle(x, y, outer, max(inner, 0.0), (1 + 1e-6) / max(math.cos(widest / 2), 1e-9))
+        return _Circle(x, y, outer, max(inner, 0.0), (1 + 1e-6) / max(math.cos(widest / 2), 1e-9))
 
 
 def first_crowded(prints: Sequence[Footprint], gap: float, start: int = 0) -> tuple[int, int] | None:

@@ -45,7 +45,7 @@ class Rays(NamedTuple):
     far: Float32
 
 
-class Lit(NamedTuple):
+class _Lit(NamedTuple):
     """The light that patches emit or reflect directly.
 
     Its fields are reflectance (M, 3), emitted radiance (M, 3), and irradiance of lamps and sun (M, 3).
@@ -106,7 +106,7 @@ class Patches:
         tree: Tree,
         lights: Lights,
         off: float,
-    ) -> Lit:
+    ) -> _Lit:
         """Return the patches' materials, and the light of lamps and sun on them.
 
         which (T,): the indices of the surfaces' triangles that rays meet; `off`: the distance from surfaces at which shadows
@@ -131,7 +131,7 @@ class Patches:
         hits = np.zeros((self.count, kernels.HITS, 9), np.float32)
         hits[rows, columns] = np.concatenate([answers, arrived], axis=1)
         mean = self._mean(hits)
-        return Lit(mean[:, :3], mean[:, 3:6], mean[:, 6:])
+        return _Lit(mean[:, :3], mean[:, 3:6], mean[:, 6:])
 
 
 ANY_VIEW = PictureRays(

@@ -24,7 +24,7 @@ BRIGHTEST = 4.0
 """Maximum radiance of mirrored things: brighter highlights would show as dots in the mirror."""
 
 
-class Mirrored(NamedTuple):
+class _Mirrored(NamedTuple):
     """The mirror image in n pixels.
 
     things (n, 3): the radiance of things; hidden (n, 1): the share of the sky that they hide; sky (n, 3): the sky's radiance;
@@ -55,7 +55,7 @@ def looked_at(camera: Camera, visibility: Visibility, at: NDArray[np.intp]) -> t
     return cosine, place
 
 
-def mirrored(baked: Baked, camera: Camera, plane: float, left_out: NDArray[np.bool_], at: NDArray[np.intp]) -> Mirrored:
+def mirrored(baked: Baked, camera: Camera, plane: float, left_out: NDArray[np.bool_], at: NDArray[np.intp]) -> _Mirrored:
     """Return the image of a mirror at the height `plane` in the pixels `at` (n,), without the triangles `left_out` (T,)."""
     below = _below(camera, plane)
     geometry, blended = (_without(geometry, left_out) for geometry in (baked.geometry, baked.blended))
@@ -71,7 +71,7 @@ def mirrored(baked: Baked, camera: Camera, plane: float, left_out: NDArray[np.bo
     sky = np.ones_like(light)
     sky[at] = 0  # read only here
     sky_behind(view, baked.surrounding, sky)
-    return Mirrored(np.minimum(light[at, :3], BRIGHTEST), light[at, 3:], sky[at, :3], depth[at])
+    return _Mirrored(np.minimum(light[at, :3], BRIGHTEST), light[at, 3:], sky[at, :3], depth[at])
 
 
 def _without(geometry: Geometry, left_out: NDArray[np.bool_]) -> Geometry:

@@ -84,7 +84,7 @@ class Lights(NamedTuple):
 
 
 @dataclass(frozen=True)
-class ShadowView:
+class _ShadowView:
     """One map to draw: the (4, 4) matrix from the world, the minimum w (or, if round, the minimum distance), texels per length
     (at distance 1), and the minimum distance from the border at which it is read.
 
@@ -233,7 +233,7 @@ def _views(source: _Source, points: Float, casters: Casters, size: int) -> Views
     return drawn
 
 
-def _is_in_bulb(views: Sequence[ShadowView], drawn: Views, radius: float) -> bool:
+def _is_in_bulb(views: Sequence[_ShadowView], drawn: Views, radius: float) -> bool:
     """Return whether most of the surfaces in these views are inside the emitting ball: a bulb, which would hide all of its
     light. A table top that cuts through the ball hides at most half of it.
     """
@@ -245,7 +245,7 @@ def _is_in_bulb(views: Sequence[ShadowView], drawn: Views, radius: float) -> boo
     return within > _BULB * count
 
 
-def _is_shut_in(views: Sequence[ShadowView], drawn: Views, has_ground: bool) -> bool:
+def _is_shut_in(views: Sequence[_ShadowView], drawn: Views, has_ground: bool) -> bool:
     """Return whether all rays of these views end at a target, or on the ground."""
     for i, view in enumerate(views):
         right, up, ahead = view.matrix[0, 2] / view.texels, view.matrix[1, 2] / view.texels, view.matrix[3, 2]
@@ -287,14 +287,14 @@ def _wide_from_afar(backdrop: _Backdrop) -> Views:
     """
     away = -np.array(backdrop.direction)
     span, widest = backdrop.span, 2 * backdrop.reach
-    views: list[ShadowView] = []
+    views: list[_ShadowView] = []
     while not views or (span < widest and len(views) < _MOST_WIDE):
         span = min(_WIDER * span, max(widest, backdrop.span))
         views.append(parallel_view(away, np.zeros(3), span, backdrop.tangent, backdrop.size))
     return draw_views(views, backdrop.casters)
 
 
-def parallel_view(away: Float, middle: Float, span: float, tangent: float, size: int, margin: int = _MARGIN) -> ShadowView:
+def parallel_view(away: Float, middle: Float, span: float, tangent: float, size: int, margin: int = _MARGIN) -> _ShadowView:
     """Return the view from a distant light with this tangent of its half angle, in the direction `away`.
 
     The view is `span` wide around the point `middle`.
@@ -305,14 +305,14 @@ def parallel_view(away: Float, middle: Float, span: float, tangent: float, size:
     matrix[:3, :3] = np.stack([texels * right, texels * up, away])
     matrix[:2, 3] = -matrix[:2, :3] @ middle
     matrix[3, 3] = 1.0
-    return ShadowView(matrix, 0.5, texels, size, 1.0, _ball(tangent), True)
+    return _ShadowView(matrix, 0.5, texels, size, 1.0, _ball(tangent), True)
 
 
 def _ball(radius: float) -> Float:
     return np.array([[radius, 0.0, 0.0], [0.0, radius, 0.0]])
 
 
-def _fitted_from_afar(source: _Source, points: Float, casters: Casters, size: int) -> ShadowView:
+def _fitted_from_afar(source: _Source, points: Float, casters: Casters, size: int) -> _ShadowView:
     """The view of a distant light around the targets and the penumbrae behind them."""
     away = -source.place
     axes = np.stack([*_level_axes(away), away])
@@ -332,7 +332,7 @@ def _fitted_from_afar(source: _Source, points: Float, casters: Casters, size: in
     return parallel_view(away, axes.T @ middle, span, tangent, size)
 
 
-def _perspective(source: _Source, axes: Float, tangent: float, size: int, guard: float) -> ShadowView:
+def _perspective(source: _Source, axes: Float, tangent: float, size: int, guard: float) -> _ShadowView:
     """Return the view from a light at a place along the third of these axes, up to this tangent to all sides."""
     texels = size / 2 / tangent
     matrix = np.zeros((4, 4))
@@ -342,10 +342,10 @@ def _perspective(source: _Source, axes: Float, tangent: float, size: int, guard:
     near = max(1e-3, 0.02 * source.radius)
     is_round = source.kind != AREA or source.radius == 0
     sides = _ball(source.radius) if is_round else np.stack([source.right, source.up]) @ axes.T
-    return ShadowView(matrix, near, texels, size, guard, sides, is_round)
+    return _ShadowView(matrix, near, texels, size, guard, sides, is_round)
 
 
-def _fitted_from_place(source: _Source, points: Float, casters: Casters, size: int) -> ShadowView | None:
+def _fitted_from_place(source: _Source, points: Float, casters: Casters, size: int) -> _ShadowView | None:
     """One perspective view of the targets, if they fit in one; it is along a rectangle's own axis if possible."""
     away = (casters.extent.low + casters.extent.high) / 2 - source.place
     distance = float(np.linalg.norm(away))
@@ -371,7 +371,7 @@ def _fitted_from_place(source: _Source, points: Float, casters: Casters, size: i
     return None
 
 
-def _all_round(source: _Source, size: int) -> list[ShadowView]:
+def _all_round(source: _Source, size: int) -> list[_ShadowView]:
     """Views of everything that the light may reach: its cone, or the faces of a cube."""
     axis = source.axis if source.kind != POINT else np.array([0.0, 0.0, -1.0])
     right, up = _level_axes(axis)
@@ -386,7 +386,7 @@ def _all_round(source: _Source, size: int) -> list[ShadowView]:
     return [_perspective(source, np.stack(face), _FACE, size, guard) for face in faces]
 
 
-def draw_views(views: Sequence[ShadowView], casters: Casters, opposite: bool = False) -> Views:
+def draw_views(views: Sequence[_ShadowView], casters: Casters, opposite: bool = False) -> Views:
     """Maps of all triangles seen in these views; `opposite` adds the same number of views from the other side, after them."""
     count = len(views) * (2 if opposite else 1)
     form, grid = np.zeros((count, kernels.FORM), np.float32), np.zeros((count, kernels.GRID), np.int64)
@@ -412,7 +412,7 @@ def draw_views(views: Sequence[ShadowView], casters: Casters, opposite: bool = F
 
 
 def _draw(
-    view: ShadowView, tilt: float, surfaces: Surfaces, textures: Textures, nearest: Float32, farthest: Float32 | None = None
+    view: _ShadowView, tilt: float, surfaces: Surfaces, textures: Textures, nearest: Float32, farthest: Float32 | None = None
 ) -> None:
     """Draw these surfaces over a map of a view, and over the map of the farthest surfaces, if given."""
     if not len(surfaces.triangles):
@@ -424,7 +424,7 @@ def _draw(
     kernels.draw_depth(corners, first, surfaces, textures, view.near, tilt, nearest, other)
 
 
-def _begin(view: ShadowView, tilt: float, casters: Casters, nearest: Float32) -> tuple[Part, ...]:
+def _begin(view: _ShadowView, tilt: float, casters: Casters, nearest: Float32) -> tuple[Part, ...]:
     """Draw the still things of a sequence into an empty map; return the parts that are still to be drawn."""
     maps, key = casters.maps, (view.matrix.tobytes(), view.near, tilt, view.size)
     kept = None if maps is None else maps.begun(key)
@@ -487,7 +487,7 @@ def _lay_out(row: NDArray[np.int64], size: int, texels: int, cells: int) -> tupl
     return texels, cells
 
 
-def _form_row(view: ShadowView, from_behind: bool) -> Float32:
+def _form_row(view: _ShadowView, from_behind: bool) -> Float32:
     row = np.zeros(kernels.FORM, np.float32)
     matrix = view.matrix.copy()
     if from_behind:

@@ -49,7 +49,7 @@ FACES: tuple[tuple[tuple[int, int, int], ...], ...] = (
 
 
 @dataclass(frozen=True, eq=False)
-class PinholeView:
+class _PinholeView:
     """A covering pinhole picture: its `camera`, and the places where the rays of the lens's pixels meet it.
 
     pixels (N,): indices of the lens's pixels that this picture serves; x, y (N,): the places of their rays in the picture, in
@@ -62,14 +62,14 @@ class PinholeView:
     y: Float | None = None
 
 
-def views_of(camera: Camera) -> tuple[PinholeView, ...]:
+def views_of(camera: Camera) -> tuple[_PinholeView, ...]:
     """The covering pictures of a camera.
 
     They are the camera's own picture for a pinhole without skew, a slightly wider one for a lens that bends rays slightly,
     otherwise up to six sides of a cube.
     """
     if camera.lens.is_linear and camera.intrinsics.skew == 0:
-        return (PinholeView(camera),)
+        return (_PinholeView(camera),)
     rays = pixel_rays(camera.intrinsics).reshape(-1, 3)
     seen_pixels = np.flatnonzero(np.isfinite(rays).all(axis=1))
     ahead = rays[seen_pixels]
@@ -85,17 +85,17 @@ def views_of(camera: Camera) -> tuple[PinholeView, ...]:
     return tuple(views)
 
 
-def _view(camera: Camera, face: Float, pixels: NDArray[np.int64], rays: Float) -> PinholeView:
+def _view(camera: Camera, face: Float, pixels: NDArray[np.int64], rays: Float) -> _PinholeView:
     """The smallest covering picture, with the axes `face`, through which these rays pass."""
     focal = FINER * max(camera.intrinsics.fx, camera.intrinsics.fy)
     x, y = focal * rays[:, 0] / rays[:, 2], focal * rays[:, 1] / rays[:, 2]
     left, top = math.floor(x.min()) - MARGIN, math.floor(y.min()) - MARGIN
     width, height = math.ceil(x.max()) + MARGIN - left, math.ceil(y.max()) + MARGIN - top
     pinhole = Intrinsics(width=width, height=height, fx=focal, fy=focal, cx=-left, cy=-top)
-    return PinholeView(Camera(pinhole, face @ camera.R, face @ camera.t), pixels, x - left, y - top)
+    return _PinholeView(Camera(pinhole, face @ camera.R, face @ camera.t), pixels, x - left, y - top)
 
 
-def resampled(camera: Camera, views: Sequence[PinholeView], pictures: Sequence[Float32], mixed: bool = True) -> Float32:
+def resampled(camera: Camera, views: Sequence[_PinholeView], pictures: Sequence[Float32], mixed: bool = True) -> Float32:
     """The lens's picture (H, W, C) float32, bilinear, or from the nearest pixels if not `mixed`; empty in pixels without a
     ray.
     """

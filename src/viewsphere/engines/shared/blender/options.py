@@ -17,7 +17,7 @@ Device = Literal["cpu", "cuda", "optix", "hip", "metal", "oneapi"]
 
 
 @dataclass(frozen=True)
-class Common:
+class _Common:
     """Options of every renderer.
 
     samples: per pixel; threads: of one Blender, 0 for all cores; python: the interpreter that has bpy, None to search for it;
@@ -42,7 +42,7 @@ class Common:
 
 
 @dataclass(frozen=True)
-class Options(Common):
+class Options(_Common):
     """Options of Cycles. denoise: off, fast or best (Open Image Denoise); bounces: of light; device: the kind of device that
     renders.
     """
@@ -56,7 +56,7 @@ class Options(Common):
 
 
 @dataclass(frozen=True)
-class Eevee(Common):
+class Eevee(_Common):
     """Options of EEVEE. raytracing: adds reflections of visible surfaces in others, and shading by nearby ones."""
 
     renderer = "eevee"
@@ -67,7 +67,7 @@ class Eevee(Common):
 
 
 @dataclass(frozen=True)
-class Workbench(Common):
+class Workbench(_Common):
     """Options of Workbench."""
 
     renderer = "workbench"
@@ -77,7 +77,7 @@ class Workbench(Common):
 
 
 AnyOptions = Options | Eevee | Workbench
-_Own = TypeVar("_Own", bound=Common)
+_Own = TypeVar("_Own", bound=_Common)
 
 PRESETS = {
     "draft": Options(samples=3, denoise="fast", bounces=2),
@@ -123,7 +123,7 @@ def _parsed(given: Mapping[str, JsonValue], presets: Mapping[str, _Own]) -> _Own
     return replace(presets[quality], **checked)
 
 
-def _checked(name: str, value: JsonValue, default: Common) -> JsonValue:
+def _checked(name: str, value: JsonValue, default: _Common) -> JsonValue:
     if name in _CHOICES:
         value = "off" if value is False else value  # YAML reads a bare `off` as false
         if value not in _CHOICES[name]:

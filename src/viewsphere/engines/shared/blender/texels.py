@@ -74,7 +74,7 @@ CONTENTS: Mapping[str, Content] = {
 
 
 @dataclass(frozen=True, eq=False)
-class Density:
+class _Density:
     """The density of a picture's texels on a surface.
 
     texels (T,): texels per metre of each triangle, along the direction with the fewest, ascending; area (T,): square metres
@@ -85,7 +85,7 @@ class Density:
     area: Float
 
     @classmethod
-    def from_mesh(cls, mesh: Mesh, chosen: NDArray[np.bool_], texture: Texture, size: tuple[int, int]) -> Density:
+    def from_mesh(cls, mesh: Mesh, chosen: NDArray[np.bool_], texture: Texture, size: tuple[int, int]) -> _Density:
         """The density on the chosen triangles (T,); size: the picture's width and height. Clamped parts have no extent."""
         uv = mesh.uv1 if texture.texcoord else mesh.uv0
         assert uv is not None
@@ -140,7 +140,7 @@ class Kind:
     repaints: tuple[Repaint, ...]
     has_backs: bool
     things: tuple[Thing, ...]
-    _densities: dict[tuple[int, Texture, tuple[int, int]], Density] = field(default_factory=dict)
+    _densities: dict[tuple[int, Texture, tuple[int, int]], _Density] = field(default_factory=dict)
     _made: dict[Key, Image] = field(default_factory=dict)
     _read: dict[tuple[int, int, str], Float] = field(default_factory=dict)
     _matt: dict[tuple[int, int], bool] = field(default_factory=dict)
@@ -186,7 +186,7 @@ class Kind:
         height, width = self.mesh.images[texture.image].pixels.shape[:2]
         key = index, replace(texture, image=0, nearest=False), (width, height)
         if key not in self._densities:
-            self._densities[key] = Density.from_mesh(self.mesh, self.mesh.triangle_material == index, texture, (width, height))
+            self._densities[key] = _Density.from_mesh(self.mesh, self.mesh.triangle_material == index, texture, (width, height))
         even = math.gcd(width, height)
         level = min(self._densities[key].halvings(pixels), (even & -even).bit_length() - 1)
         return level if CONTENTS[name] != "normal" or level == 0 or self._is_matt(index, level) else 0

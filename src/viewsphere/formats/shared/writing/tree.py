@@ -109,7 +109,7 @@ class Tree(ABC):
         yield from ()
 
 
-class Functions(NamedTuple):
+class _Functions(NamedTuple):
     """The functions that a format's module derives from a tree: see `viewsphere.plugins.format.FormatSpec`."""
 
     preparer: Callable[..., Callable[[Sample], list[Piece]]]
@@ -117,7 +117,7 @@ class Functions(NamedTuple):
     verify: Callable[..., Iterator[Remark]]
 
 
-def functions(kind: type[Tree]) -> Functions:
+def functions(kind: type[Tree]) -> _Functions:
     """The functions of the format of this tree."""
 
     def preparer(dataset: Dataset, folder: Path, *options: Any) -> Callable[[Sample], list[Piece]]:
@@ -156,7 +156,7 @@ def functions(kind: type[Tree]) -> Functions:
             for path in collected.files:
                 yield from _different(scratch_folder / path, folder / path)
 
-    return Functions(preparer, writer, verify)
+    return _Functions(preparer, writer, verify)
 
 
 @contextmanager

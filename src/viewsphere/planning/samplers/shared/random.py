@@ -117,7 +117,7 @@ def scene_laid(context: SamplingContext, subject: str, pose: str | None, box_of:
 def _laid(root: SamplingContext, redraw: int, subject: str, pose: str | None, box_of: BoxOf) -> Laid:
     context, recipe, entry = root.redrawn(redraw), root.recipe, scenes_entry(root.recipe)
     models = (*scene_cast(context, subject), *_distractors(context, subject))
-    stand = surface(context, subject, pose)
+    stand = _surface(context, subject, pose)
     if stand is None:
         free = None if context.composition is None else context.composition.free_floor(subject, pose, redraw)
     else:
@@ -213,7 +213,7 @@ def _check_surface(recipe: Recipe) -> None:
         _named(on, tuple(surfaces.values()))
 
 
-def surface(context: SamplingContext, subject: str, pose: str | None) -> Surface | None:
+def _surface(context: SamplingContext, subject: str, pose: str | None) -> Surface | None:
     """Return the surface under a scene's models, world axes; None for the floor. Raises RecipeError for an absent surface."""
     on = scenes_entry(context.recipe).surface
     if on is None:
