@@ -4,9 +4,10 @@ import math
 
 import numpy as np
 import pytest
-from test_embree import compare, embree, trace, turned
+from test_embree import turned
 
 from quick import quick
+from ray_proofs import compare, embree, trace
 from shots import still_shot
 from truth_scenes import LENSES, cube, lens, mesh_of, orbit_camera, placed, sphere
 from viewsphere.geometry.box3d import Box3d

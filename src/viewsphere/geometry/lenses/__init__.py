@@ -151,10 +151,10 @@ class LensSpec(BaseModel):
         description="`bounds(lens, R, t, vertices, is_used, triangles)`: the 2D box of what the lens shows of triangles (n, 3) "
         "of world vertices (v, 3), None without, and whether it shows all. Default: a search that needs `project` alone",
     )
-    focal: Callable[[float, float], float] | None = Field(
+    focal: Callable[[Any, float, float], float] | None = Field(
         default=None,
-        description="`focal(fov, extent)`: the focal length, pixels, with which `extent` pixels span an angle (radians) around "
-        "the axis. Default: a pinhole's",
+        description="`focal(parameters, fov, extent)`: the focal length, pixels, with which `extent` pixels span an angle "
+        "(radians) around the axis; raises ValueError for an angle that the lens cannot have. Default: a pinhole's",
     )
     field_of_view: Callable[[Any], tuple[float, float]] | None = Field(
         default=None,
@@ -366,10 +366,10 @@ def lens_of(intrinsics: Intrinsics) -> Lens:
 
 def focal_from_fov(fov: float, extent: float, parameters: LensParameters | None = None) -> float:
     """The focal length in pixels at which `extent` pixels span the angle `fov` (radians); for a pinhole if no parameters are
-    given.
+    given. Raises ValueError for an angle that the lens cannot have.
     """
     focal = _spec(DEFAULT if parameters is None else parameters.model).focal
-    return extent / (2 * math.tan(fov / 2)) if focal is None else focal(fov, extent)
+    return extent / (2 * math.tan(fov / 2)) if focal is None else focal(parameters, fov, extent)
 
 
 def lens_parameters(model: str, **values: Any) -> LensParameters:

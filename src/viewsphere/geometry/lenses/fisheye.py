@@ -55,7 +55,7 @@ def _bounds(
     return bent_bounds(BentLens(True, k, limit(k), lens.intrinsics.K), R, t, vertices, is_used, triangles)
 
 
-def _focal(fov: float, extent: float) -> float:
+def _focal(_own: Fisheye, fov: float, extent: float) -> float:
     """The focal length without coefficients: the distance from the centre is this length times the angle."""
     return extent / fov
 

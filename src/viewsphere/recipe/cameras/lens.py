@@ -5,7 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Annotated, Any, cast
 
-from pydantic import BeforeValidator, SerializeAsAny, ValidationError, WithJsonSchema
+from pydantic import BeforeValidator, GetJsonSchemaHandler, SerializeAsAny, ValidationError
+from pydantic.json_schema import JsonSchemaValue
+from pydantic_core import CoreSchema
 
 from viewsphere import plugins
 from viewsphere.geometry.lenses import LensParameters
@@ -30,21 +32,25 @@ def _read(value: Any) -> Any:
         raise explained(error, tuple(parameters.model_fields)) from None
 
 
-DistortionField = Annotated[
-    SerializeAsAny[LensParameters],
-    BeforeValidator(_read),
-    WithJsonSchema(
-        {
-            "type": "object",
-            "properties": {
-                "model": {"type": "string", "description": "brown_conrady, fisheye, pinhole, or a lens of your own"},
-                "coefficients": {
-                    "type": "array",
-                    "items": {"type": "number"},
-                    "description": "in OpenCV's order: 4, 5 or 8 of brown_conrady, 4 of fisheye",
-                },
-            },
-            "required": ["model"],
-        }
-    ),
-]
+class _Schema:
+    """The JSON schema of all shipped lenses: their names and their parameters."""
+
+    def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
+        pictures = {name: spec for name, spec in plugins.loadable(LensSpec).items() if not spec.is_scan}
+        shipped = {name: spec for name, spec in pictures.items() if not plugins.is_third_party("lenses", name)}
+        named = f"{', '.join(shipped)}, or a lens of your own"
+        fields: dict[str, Any] = {"model": {"type": "string", "description": named}}
+        for name, spec in shipped.items():
+            own = spec.parameters.model_json_schema()
+            assert "$defs" not in own, f"parameters of {name}: expected plain types"
+            for field, value in own["properties"].items():
+                if field == "model":
+                    continue
+                entry = fields.setdefault(field, {"type": value["type"], "description": ""})
+                entry["description"] += f"{'; ' if entry['description'] else ''}{name}: {value.get('description', '')}"
+                if value["type"] == "array":
+                    entry["items"] = {"type": "number"}
+        return {"type": "object", "properties": fields, "required": ["model"]}
+
+
+DistortionField = Annotated[SerializeAsAny[LensParameters], BeforeValidator(_read), _Schema()]

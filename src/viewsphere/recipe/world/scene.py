@@ -20,7 +20,7 @@ from pydantic import (
 
 from viewsphere.errors import RecipeError
 from viewsphere.geometry.camera import focal_from_sensor
-from viewsphere.geometry.lenses import LensOptions, focal_from_fov
+from viewsphere.geometry.lenses import LensOptions, LensParameters, focal_from_fov
 from viewsphere.model.fields.frozen import Frozen
 from viewsphere.model.fields.numbers import Count, Number, Positive
 from viewsphere.model.scene import WEATHER
@@ -182,9 +182,16 @@ class CameraEntry(WithProjection):
         else:
             assert self.fov_deg is not None
             across = width if self.fov_axis == "horizontal" else height
-            fx = fy = focal_from_fov(math.radians(self.fov_deg), across, self.distortion)
+            fx = fy = _focal(self.fov_deg, across, self.distortion)
         with told_of("camera"):
             return Intrinsics(width=width, height=height, fx=fx, fy=fy, cx=cx, cy=cy, skew=skew, distortion=self.distortion)
+
+
+def _focal(fov_deg: float, extent: int, distortion: LensParameters | None) -> float:
+    try:
+        return focal_from_fov(math.radians(fov_deg), extent, distortion)
+    except ValueError as error:
+        raise RecipeError(f"camera.fov_deg: {error}") from None
 
 
 def _calibrated(options: LensOptions, size: tuple[int, int]) -> Intrinsics:

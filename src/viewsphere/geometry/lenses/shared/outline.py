@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import Protocol
 
 import numpy as np
@@ -85,21 +86,26 @@ def _followed(lens: Shows, box: Bounds, ends: Float, pixels: Float) -> tuple[Bou
     return box, whole
 
 
-def _rim_inside(lens: Shows, triangles: Float) -> Float:
-    """The positions, in each row and column, of the outermost pixels with a ray whose rays hit one of the triangles (n, 3, 3)
-    in camera axes.
-    """
+@lru_cache(maxsize=16)
+def _rim(lens: Shows) -> tuple[Float, Float]:
+    """The rays (M, 3) of the outermost pixels with a ray in each row and column of the picture, and their centres (M, 2)."""
     directions = lens.directions()
     has_ray: Flags = ~np.isnan(directions[..., 0])
     rows, columns = np.flatnonzero(has_ray.any(axis=1)), np.flatnonzero(has_ray.any(axis=0))
     first, last = has_ray.argmax(axis=1)[rows], has_ray.shape[1] - 1 - has_ray[:, ::-1].argmax(axis=1)[rows]
     top, bottom = has_ray.argmax(axis=0)[columns], has_ray.shape[0] - 1 - has_ray[::-1].argmax(axis=0)[columns]
     down, across = np.concatenate((rows, rows, top, bottom)), np.concatenate((first, last, columns, columns))
-    rim, meets = directions[down, across], np.zeros(len(down), np.bool_)
+    return directions[down, across], np.stack((across, down), axis=-1) + np.float64(0.5)
+
+
+def _rim_inside(lens: Shows, triangles: Float) -> Float:
+    """The positions of those `_rim` pixels whose rays hit one of the triangles (n, 3, 3) in camera axes."""
+    rim, centres = _rim(lens)
+    meets = np.zeros(len(rim), np.bool_)
     step = max(MOST // max(len(rim), 1), 1)
     for begin in range(0, len(triangles), step):
         a, b, c = triangles[begin : begin + step].transpose(1, 0, 2)
         volumes = np.stack([np.cross(p, q) @ rim.T for p, q in ((b, c), (c, a), (a, b))])
         whole = np.einsum("ni,ni->n", a, np.cross(b, c))[:, None]
         meets |= ((volumes * np.sign(whole) >= 0).all(axis=0) & (whole != 0)).any(axis=0)
-    return np.stack((across, down), axis=-1)[meets] + np.float64(0.5)
+    return centres[meets]
