@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewsphere.geometry.lenses import NEAR, Bounds, Camera
+from viewsphere.geometry.seam import clip_to_turn
 
 Float = NDArray[np.float64]
 
@@ -19,6 +20,15 @@ def clip_to_image(bounds: Bounds, width: int, height: int) -> Bounds | None:
     if not (x1 > 0 and y1 > 0 and x0 < width and y0 < height):
         return None
     return max(x0, 0.0), max(y0, 0.0), min(x1, float(width)), min(y1, float(height))
+
+
+def clip_to_picture(bounds: Bounds, camera: Camera) -> Bounds | None:
+    """The part of a 2D box inside a camera's picture, which has no left and right border if it shows a full turn; None if
+    there is none.
+    """
+    if camera.lens.period is not None:
+        return clip_to_turn(bounds, float(camera.height))
+    return clip_to_image(bounds, camera.width, camera.height)
 
 
 def overlap(a: Bounds, b: Bounds) -> bool:

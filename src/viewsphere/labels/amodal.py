@@ -7,12 +7,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from viewsphere.geometry.mask import decode_rle, mask_box, rle_box, rle_of_part
+from viewsphere.geometry.mask import decode_rle, rle_of_part
+from viewsphere.geometry.seam import mask_bounds, rle_bounds, turns
 from viewsphere.labels.shared.drawing.colors import color_of
 from viewsphere.labels.shared.field import Field
 from viewsphere.labels.shared.placement import Placement
-from viewsphere.labels.shared.spec import Drawing, Models, ObjectLabel, rendered
+from viewsphere.labels.shared.spec import Drawing, Models, ObjectLabel, period_of, rendered
 from viewsphere.model.sample import ObjectAnnotation, Rle, Sample
+from viewsphere.model.sensors.camera import Camera
 
 if TYPE_CHECKING:
     from PIL.ImageDraw import ImageDraw
@@ -33,17 +35,17 @@ def _compute(context: LabelContext, i: int) -> Mapping[str, Any]:
     else:
         alone = context.isolated(i).in_image(width, height)
         x0, y0, part = alone.left, alone.top, alone.inverse_depth > 0
-    return _fields(height, width, rle_of_part(height, width, part, x0, y0))
+    return _fields(context.camera, rle_of_part(height, width, part, x0, y0))
 
 
 def _restore(counts: str, placement: Placement, o: ObjectAnnotation) -> Mapping[str, Any]:
     """Both fields, from the stored run-length code."""
-    return _fields(placement.camera.height, placement.camera.width, counts)
+    return _fields(placement.camera, counts)
 
 
-def _fields(height: int, width: int, counts: str) -> Mapping[str, Any]:
-    tight = rle_box(height, width, counts)
-    return {"amodal": Rle(height, width, counts), "box2d_amodal": tight and tuple(map(float, tight))}
+def _fields(camera: Camera, counts: str) -> Mapping[str, Any]:
+    code = Rle(camera.height, camera.width, counts)
+    return {"amodal": code, "box2d_amodal": rle_bounds(camera.height, camera.width, counts, camera.lens.period)}
 
 
 def _prove(sample: Sample, models: Models) -> Iterator[str]:
@@ -56,8 +58,9 @@ def _prove(sample: Sample, models: Models) -> Iterator[str]:
         seen, inside = o.mask, int(amodal.sum())
         if (seen & ~amodal).any():
             yield f"object {o.id}: expected the visible pixels among the amodal ones, found {(seen & ~amodal).sum()} others"
-        if o.box2d_amodal != mask_box(amodal):
-            yield f"object {o.id}: expected box2d_amodal {mask_box(amodal)}, found {o.box2d_amodal}"
+        tight = mask_bounds(amodal, period_of(sample))
+        if o.box2d_amodal != tight:
+            yield f"object {o.id}: expected box2d_amodal {tight}, found {o.box2d_amodal}"
         shown = int(seen.sum())
         if shown and abs(o.visibility * inside - shown * (1 - o.truncation)) > 1e-6 * inside:
             yield (
@@ -78,7 +81,8 @@ def _draw(pen: ImageDraw, sample: Sample, scale: float) -> None:
             if (px + py) % 4 < 2:
                 pen.rectangle((px * scale, py * scale, (px + 1) * scale - 1, (py + 1) * scale - 1), fill=(*color, 150))
         x0, y0, x1, y1 = (v * scale for v in o.box2d_amodal)
-        pen.rectangle((x0, y0, x1 - 1, y1 - 1), outline=color, width=1)
+        for turn in (scale * n for n in turns(period_of(sample))):
+            pen.rectangle((x0 - turn, y0, x1 - 1 - turn, y1 - 1), outline=color, width=1)
 
 
 LABEL = ObjectLabel(

@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Any
 
-from viewsphere.geometry.box import Bounds, clip_to_image
+from viewsphere.geometry.box import Bounds, clip_to_picture
 from viewsphere.geometry.mask import mask_box
+from viewsphere.geometry.seam import tight_box, turns, united
 from viewsphere.labels.shared.drawing.colors import color_of
 from viewsphere.labels.shared.placement import Placement
-from viewsphere.labels.shared.spec import Drawing, Field, Models, ObjectLabel, rendered
+from viewsphere.labels.shared.spec import Drawing, Field, Models, ObjectLabel, period_of, rendered
 from viewsphere.model.sample import ObjectAnnotation, Sample
 from viewsphere.model.sensors.camera import Camera
 
@@ -26,15 +27,19 @@ def _compute(context: LabelContext, i: int) -> Mapping[str, Any]:
     bounds, whole = context.projected[i]
     projected = _clipped(bounds, context.camera)
     if not whole and context.instances.area[i + 1]:
-        x0, y0, x1, y1 = map(float, context.instances.box[i + 1].tolist())
-        x0, y0, x1, y1 = x0 + 0.5, y0 + 0.5, x1 - 0.5, y1 - 0.5
-        a = projected or (x0, y0, x1, y1)
-        projected = min(a[0], x0), min(a[1], y0), max(a[2], x1), max(a[3], y1)
+        x0, y0, x1, y1 = _seen(context, i)
+        seen = x0 + 0.5, y0 + 0.5, x1 - 0.5, y1 - 0.5
+        projected = united(projected or seen, seen, context.camera.lens.period)
     return {"box2d_projected": projected, "box2d_unclipped": bounds if whole else None}
 
 
+def _seen(context: LabelContext, i: int) -> tuple[int, int, int, int]:
+    x0, y0, x1, y1 = context.instances.box[i + 1].tolist()
+    return tight_box((x0, y0, x1, y1), context.camera.lens.period, lambda: context.instances.ids == i + 1)
+
+
 def _clipped(bounds: Bounds | None, camera: Camera) -> Bounds | None:
-    return bounds and clip_to_image(bounds, camera.width, camera.height)
+    return bounds and clip_to_picture(bounds, camera)
 
 
 def _keep(o: ObjectAnnotation) -> Any:
@@ -58,7 +63,7 @@ def _prove(sample: Sample, models: Models) -> Iterator[str]:
     """
     for o in rendered(sample):
         tight, around, unclipped = mask_box(o.mask), o.box2d_projected, o.box2d_unclipped
-        if tight and (around is None or not _within(tight, around, 1.0)):
+        if tight and (around is None or not _holds(around, tight, sample, o)):
             yield f"object {o.id}: expected the visible box in the projected one, found {tight} and {around}"
         if unclipped and around != _clipped(unclipped, sample.camera):
             yield f"object {o.id}: expected box2d_projected to be the clipped {unclipped}, found {around}"
@@ -66,6 +71,14 @@ def _prove(sample: Sample, models: Models) -> Iterator[str]:
             x, y = o.box3d_pixels.T
             if not _within(unclipped, (x.min(), y.min(), x.max(), y.max()), 1e-3):
                 yield f"object {o.id}: expected box2d_unclipped within the projected 3D box, found {unclipped}"
+
+
+def _holds(around: Bounds, tight: tuple[int, int, int, int], sample: Sample, o: ObjectAnnotation) -> bool:
+    """Return whether a box holds the visible pixels, to a pixel, in one of the turns of a picture of a full turn."""
+    period = period_of(sample)
+    x0, y0, x1, y1 = tight_box(tight, period, lambda: o.mask)
+    wide = 0 if period is None or around[2] - around[0] < period - 2 else period  # a box all around holds every column
+    return any(_within((x0 + turn, y0, x1 + turn, y1), around, 1.0 + wide) for turn in turns(period))
 
 
 def _within(inner: tuple[float, ...], outer: tuple[float, ...], slack: float) -> bool:
@@ -81,7 +94,9 @@ def _draw(pen: ImageDraw, sample: Sample, scale: float) -> None:
     """Every object's box, seen or hidden, in its colour."""
     for o in sample.objects:
         if o.box2d_projected is not None:
-            pen.rectangle(tuple(v * scale for v in o.box2d_projected), outline=color_of(o.id), width=1)
+            x0, y0, x1, y1 = (v * scale for v in o.box2d_projected)
+            for turn in (scale * n for n in turns(period_of(sample))):
+                pen.rectangle((x0 - turn, y0, x1 - turn, y1), outline=color_of(o.id), width=1)
 
 
 _CORNERS = "corners (x0, y0, x1, y1) of the projected model"

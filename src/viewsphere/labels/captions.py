@@ -338,6 +338,7 @@ def _beside(sample: Sample) -> Picture:
 
 LABEL = SampleLabel(
     name="captions",
+    panoramas=False,
     meaning="sentences about the picture",
     needs=(Randomness(), ShotAppearance()),
     options=_Captions,

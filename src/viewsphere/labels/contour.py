@@ -6,8 +6,10 @@ from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from viewsphere.geometry.hull import convex_hull, mask_outline
+from viewsphere.geometry.seam import mask_bounds, part_in
 from viewsphere.labels.shared.drawing.colors import color_of
 from viewsphere.labels.shared.field import Field
 from viewsphere.labels.shared.placement import Placement
@@ -21,8 +23,16 @@ if TYPE_CHECKING:
 def _restore(kept: None, placement: Placement, o: ObjectAnnotation) -> Mapping[str, Any]:
     """Outlines and hull, from the corners of the mask's pixels."""
     mask = o.mask
-    hull = convex_hull(mask_outline(mask)) if mask.any() else np.empty((0, 2))
+    hull = convex_hull(_corners(mask, placement.camera.lens.period)) if mask.any() else np.empty((0, 2))
     return {"contour": tuple(np.array(ring).reshape(-1, 2) for ring in o.polygons), "hull": hull}
+
+
+def _corners(mask: NDArray[np.bool_], period: int | None) -> NDArray[np.float64]:
+    """The corners of a mask's pixels; across the seam of a full turn, those beyond it have x above the width."""
+    box = mask_bounds(mask, period)
+    if period is None or box is None or box[2] <= period:
+        return mask_outline(mask)
+    return mask_outline(part_in(box, mask), *box[:2])
 
 
 def _prove(sample: Sample, models: Models) -> Iterator[str]:
@@ -64,7 +74,7 @@ LABEL = ObjectLabel(
     fields=(
         Field(
             "contour",
-            "closed outlines along pixel corners, clockwise as seen, one for each connected part; holes are joined to them",
+            "closed outlines along pixel corners, clockwise as seen, one for each part connected in the picture, holes joined",
             *(float, (-1, 2), "px"),
             is_array=True,
             many=True,

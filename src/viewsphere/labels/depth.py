@@ -70,6 +70,7 @@ def _label(name: str, compute: Callable[[LabelContext], Array], meaning: str, pr
         unit="m",
         empty=np.inf,
         in_steps=name == "depth",
+        panoramas=name != "depth",
         compute=compute,
         prove=prove,
         drawing=Drawing(

@@ -165,6 +165,7 @@ def _beside(sample: Sample) -> Picture:
 
 LABEL = ChannelLabel(
     name="depth_sensor",
+    panoramas=False,
     meaning="depth as a depth camera measures it, with noise, steps and holes",
     axes="camera",
     needs=(Randomness(),),

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from viewsphere.labels.shared.drawing.flow_colors import drawing
 from viewsphere.labels.shared.needs import Next, Previous
-from viewsphere.labels.shared.spec import Array, ChannelLabel, Models, channel_of
+from viewsphere.labels.shared.spec import Array, ChannelLabel, Models, channel_of, period_of
 from viewsphere.model.sample import Sample
 from viewsphere.truth.correspondences.correspondence import pixel_centers
 from viewsphere.truth.surface_points.raster import BEHIND, OUTSIDE
@@ -25,7 +25,8 @@ EDGE = 1e-3
 def _flow(context: LabelContext, to: Next | Previous) -> NDArray[np.float32]:
     """Return the motion of each seen point to another instant, (H, W, 2) pixels, right and down.
 
-    NaN where the point has no pixel at that instant: behind the camera, on an absent thing, on a flat picture.
+    NaN where the point has no pixel at that instant: behind the camera, on an absent thing, on a flat picture. The motion takes
+    the shorter way around a picture of a full turn.
     """
     match = context.match(to)
     return np.full((*context.visibility.triangle.shape, 2), np.nan, np.float32) if match is None else match.flow
@@ -40,17 +41,18 @@ def _prove(sample: Sample, name: str) -> Iterator[str]:
     if (np.isnan(vectors[..., 0]) != np.isnan(vectors[..., 1])).any():
         yield "expected both components or none; found one of them"
     elif states is not None:
-        yield from _against(vectors, states, state)
+        yield from _against(vectors, states, state, period_of(sample))
 
 
-def _against(vectors: Array, states: Array, state: str) -> Iterator[str]:
+def _against(vectors: Array, states: Array, state: str, period: int | None) -> Iterator[str]:
     has_pixel = np.isfinite(vectors[..., 0])
     wrong = has_pixel != (states < BEHIND)
     if wrong.any():
         yield f"expected vectors where {state} is 0, 1 or 2, NaN elsewhere; found others at {wrong.sum()} pixels"
     height, width = states.shape
     there = pixel_centers(states.shape) + vectors
-    inside = np.minimum(there, (width, height) - there).min(axis=-1)  # distance from the picture's border
+    border = np.minimum(there, (width, height) - there)  # distance from the picture's border
+    inside = border.min(axis=-1) if period is None else border[..., 1]
     wrong = has_pixel & (np.abs(inside) > EDGE) & ((inside < 0) != (states == OUTSIDE))
     if wrong.any():
         yield f"expected {state} 2 where the vectors lead outside; found others at {wrong.sum()} pixels"

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from viewsphere.geometry.seam import short_way
 from viewsphere.labels.shared.needs import Next
-from viewsphere.labels.shared.spec import ChannelLabel, Drawing, Models, Picture, channel_of
+from viewsphere.labels.shared.spec import ChannelLabel, Drawing, Models, Picture, channel_of, period_of
 from viewsphere.model.sample import Sample
-from viewsphere.truth.correspondences.correspondence import pixel_centers
 
 if TYPE_CHECKING:
     from viewsphere.labels.shared.context import LabelContext
@@ -38,17 +38,38 @@ def _compute(context: LabelContext) -> NDArray[np.uint8]:
     own, match = context.own_view, context.match(Next())
     if own is None or match is None:
         return out
-    vectors = match.xy - pixel_centers(out.shape)
     thing = np.append(own.owners, -1)[context.visibility.triangle]
-    inverse = context.visibility.inverse_depth
+    inverse, period = context.visibility.inverse_depth, context.camera.lens.period
+    vectors, thing, inverse = (_closed(one, period) for one in (match.offset, thing, inverse))
+    found = np.zeros(inverse.shape, np.uint8)
     for axis in (0, 1):
         a, b = _sides(axis)
-        u, v = (vectors[b] - vectors[a]).transpose(2, 0, 1)
+        u, v = _apart(vectors, axis, period)
         torn = (thing[a] != thing[b]) | (np.abs(inverse[a] - inverse[b]) > JOINED * np.maximum(inverse[a], inverse[b]))
         boundary = torn & (u * u + v * v > APART * APART)
-        out[a] |= boundary
-        out[b] |= boundary
-    return out
+        found[a] |= boundary
+        found[b] |= boundary
+    return _opened(found, period)
+
+
+def _closed(pixels: NDArray[Any], period: int | None) -> NDArray[Any]:
+    """A picture of a full turn with its first column repeated at the end; others unchanged."""
+    return pixels if period is None else np.concatenate((pixels, pixels[:, :1]), axis=1)
+
+
+def _opened(marks: NDArray[Any], period: int | None) -> NDArray[Any]:
+    """Marks without the repeated column, whose marks the first one also has."""
+    if period is None:
+        return marks
+    marks[:, 0] |= marks[:, -1]
+    return np.ascontiguousarray(marks[:, :-1])
+
+
+def _apart(vectors: NDArray[Any], axis: int, period: int | None) -> tuple[NDArray[Any], NDArray[Any]]:
+    """The differences between the flows of neighbours, right and down."""
+    a, b = _sides(axis)
+    u, v = (vectors[b] - vectors[a]).transpose(2, 0, 1)
+    return (u if period is None else short_way(u, period)), v
 
 
 def _sides(axis: int) -> tuple[tuple[slice, ...], tuple[slice, ...]]:
@@ -62,13 +83,15 @@ def _prove(sample: Sample, models: Models) -> Iterator[str]:
     boundaries, vectors = channel_of(sample, "motion_boundaries"), channel_of(sample, "flow")
     if boundaries is None or vectors is None:
         return
-    moves_otherwise = np.zeros(boundaries.shape, np.bool_)
+    period = period_of(sample)
+    vectors = _closed(vectors, period)
+    moves_otherwise = np.zeros(vectors.shape[:2], np.bool_)
     for axis in (0, 1):
         a, b = _sides(axis)
-        differs = np.hypot(*(vectors[b] - vectors[a]).transpose(2, 0, 1)) > APART * (1 - 1e-5)
+        differs = np.hypot(*_apart(vectors, axis, period)) > APART * (1 - 1e-5)
         moves_otherwise[a] |= differs
         moves_otherwise[b] |= differs
-    wrong = (boundaries > 0) & ~moves_otherwise
+    wrong = (boundaries > 0) & ~_opened(moves_otherwise, period)
     if wrong.any():
         yield f"expected neighbours whose flow differs; found none at {wrong.sum()} pixels"
 

@@ -10,6 +10,7 @@ import numpy as np
 from viewsphere.geometry.camera import project
 from viewsphere.geometry.hull import convex_hull, mask_outline, smallest_rectangle
 from viewsphere.geometry.rotation import rigid, transform
+from viewsphere.geometry.seam import part_in, tight_box
 from viewsphere.labels.shared.drawing.colors import color_of
 from viewsphere.labels.shared.field import Field
 from viewsphere.labels.shared.placement import Placement
@@ -29,7 +30,8 @@ def _compute(context: LabelContext, i: int) -> Mapping[str, Any]:
     """Both rectangles; the model's only if the lens shows all of its vertices."""
     seen = context.instances
     x0, y0, x1, y1 = seen.box[i + 1].tolist() if seen.area[i + 1] else (0, 0, 0, 0)
-    return {"obb": _around(seen.ids[y0:y1, x0:x1] == i + 1, x0, y0), "obb_projected": _projected(context, i)}
+    box = tight_box((x0, y0, x1, y1), context.camera.lens.period, lambda: seen.ids == i + 1)
+    return {"obb": _around(part_in(box, seen.ids) == i + 1, *box[:2]), "obb_projected": _projected(context, i)}
 
 
 def _projected(context: LabelContext, i: int) -> Any:
@@ -52,7 +54,7 @@ def _restore(kept: Any, placement: Placement, o: ObjectAnnotation) -> Mapping[st
     if o.box2d is None:
         return {"obb": None, "obb_projected": None if kept is None else np.array(kept, np.float64)}
     x0, y0, x1, y1 = map(int, o.box2d)
-    around = _around(o.mask[y0:y1, x0:x1], x0, y0)
+    around = _around(part_in((x0, y0, x1, y1), o.mask), x0, y0)
     return {"obb": around, "obb_projected": None if kept is None else np.array(kept, np.float64)}
 
 
@@ -71,7 +73,8 @@ def _prove(sample: Sample, models: Models) -> Iterator[str]:
             if corners is not None:
                 yield from (f"object {o.id}: {name}: {problem}" for problem in _rectangle(corners, box))
         if o.obb is not None and o.box2d is not None:
-            outline = mask_outline(o.mask)
+            x0, y0, x1, y1 = map(int, o.box2d)
+            outline = mask_outline(part_in((x0, y0, x1, y1), o.mask), x0, y0)
             yield from (f"object {o.id}: obb: {problem}" for problem in _tight(o.obb, outline, TOLERANCE))
 
 
@@ -119,7 +122,7 @@ LABEL = ObjectLabel(
         Field("obb", f"{_CORNERS}: around its visible pixels; None without any", float, (4, 2), "px", "", True, True),
         Field(
             "obb_projected",
-            f"{_CORNERS}: around its projected model; None where the lens does not show all of it",
+            f"{_CORNERS}: around its projected model; None where the lens does not show all of it in front",
             *(float, (4, 2), "px", "", True, True),
         ),
     ),

@@ -250,6 +250,7 @@ def _draw(pen: ImageDraw, sample: Sample, scale: float) -> None:
 
 LABEL = SampleLabel(
     name="referring",
+    panoramas=False,
     meaning="expressions that single objects out",
     needs=(ShotAppearance(),),
     options=_Referring,

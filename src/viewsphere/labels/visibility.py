@@ -39,7 +39,8 @@ def _shares(context: LabelContext, i: int, area: int) -> tuple[float, float]:
     image = (0.0, 0.0, float(width), float(height))
     if whole and not overlap(own, image):
         return 0.0, 1.0
-    inside = whole and own[0] >= 0 and own[1] >= 0 and own[2] <= width and own[3] <= height
+    inside = whole and own[1] >= 0 and own[3] <= height
+    inside = inside and (context.camera.lens.period is not None or (own[0] >= 0 and own[2] <= width))
     if inside and not area:
         return 0.0, 0.0
     if inside and context.is_unobstructed(i):

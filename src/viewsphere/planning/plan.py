@@ -51,6 +51,7 @@ from viewsphere.planning.checks.models import (
     check_sizes,
     check_splits,
 )
+from viewsphere.planning.checks.panoramas import check_panoramas
 from viewsphere.planning.checks.sequences import check_sequences
 from viewsphere.planning.checks.warnings import hidden_background, hidden_by_exposure, no_light, out_of_view, too_small
 from viewsphere.planning.clips import with_clips
@@ -464,6 +465,7 @@ def plan(recipe: Recipe | str | PathLike[str], shot_frames: int | None = None) -
         check_motions(recipe)
         views = poses_of(recipe.viewpoints, recipe.time, recipe.seed, recipe.folder)
         rig = rig_of(recipe, lens(recipe, views))
+        check_panoramas(recipe, rig or Rig.single(lens(recipe, views)))
         check_frames(recipe, views)
         found = numbered_specs(recipe)
         numbered = tuple((spec, number) for spec, number in found if spec.category_id)

@@ -37,6 +37,9 @@ class FormatSpec(SpecWithOptions):
         default=None, description="names of further labels and passes that its options require"
     )
     lidar: bool = Field(default=False, description="whether frames of a LiDAR may lack the channels")
+    panoramas: bool = Field(
+        default=False, description="whether it holds pictures of lenses without z-depth, such as panoramas; others are refused"
+    )
     refuses: Annotated[Callable[..., Iterator[str]] | None, Takes(1)] = Field(
         default=None,
         description="the parts of a `viewsphere.formats.Scope` that the format cannot hold, as `expected ...; found ...`",

@@ -269,6 +269,9 @@ class Recipe(Shown, Frozen):
     def _as_meant(cls, value: tuple[str, ...], info: ValidationInfo) -> tuple[str, ...]:
         """The channels, with those that other fields require: tracks, points of LiDARs, and pictures with alpha."""
         scene: SceneEntry | None = info.data.get("scene")
+        camera: CameraEntry | None = info.data.get("camera")
+        if value is DEFAULT_CHANNELS and camera is not None and camera.lacks_depth:
+            value = tuple("depth_ray" if name == "depth" else name for name in value)
         if info.data.get("tracks") is not None:
             value = tuple(dict.fromkeys((*value, "tracks")))
         rig = info.data.get("rig")

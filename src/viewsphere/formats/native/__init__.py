@@ -69,6 +69,7 @@ FORMAT = FormatSpec(
     about=__doc__,
     holds=("poses", "3D boxes", "masks", "depth"),
     read_by=("any JSON reader",),
+    panoramas=True,
     refuses=_refuses,
     writer=_writer,
     preparer=_preparer,

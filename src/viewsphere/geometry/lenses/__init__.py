@@ -70,6 +70,11 @@ class LensOptions(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False, d
     def _with_projection(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
         return {"projection": self.projection, **handler(self)}  # also where defaults are left out
 
+    @property
+    def has_depth(self) -> bool:
+        """Return whether z-depth is defined."""
+        return _spec(self.projection).has_depth
+
     def calibration(self, size: tuple[int, int]) -> Calibration:
         """K and the parameters of the lens for a picture of this size (width, height)."""
         calibrate = _spec(self.projection).calibrate
@@ -146,6 +151,14 @@ class LensSpec(BaseModel):
         default=False, description="whether pixels are K times points, as a pinhole's: straight lines stay straight"
     )
     is_scan: bool = Field(default=False, description="whether pixels are a LiDAR's measurements instead of a picture")
+    has_depth: bool = Field(
+        default=True, description="whether z-depth is defined, with all that follows from it; False for panoramas"
+    )
+    period: Callable[[Any], int | None] | None = Field(
+        default=None,
+        description="`period(lens)`: the pixels after which the picture repeats across, its width, for a picture of a full "
+        "turn; None for others. Default: no picture does",
+    )
     bounds: Annotated[Callable[..., tuple[Bounds | None, bool]] | None, Takes(6)] = Field(
         default=None,
         description="`bounds(lens, R, t, vertices, is_used, triangles)`: the 2D box of what the lens shows of triangles (n, 3) "
@@ -214,6 +227,16 @@ class Lens:
     def is_scan(self) -> bool:
         """Return whether pixels are a LiDAR's measurements instead of a picture."""
         return self.spec.is_scan
+
+    @property
+    def has_depth(self) -> bool:
+        """Return whether z-depth is defined."""
+        return self.spec.has_depth
+
+    @cached_property
+    def period(self) -> int | None:
+        """The pixels after which a picture of a full turn repeats across, its width; None for other pictures."""
+        return None if self.spec.period is None else self.spec.period(self)
 
     @property
     def ray_cells(self) -> int | None:

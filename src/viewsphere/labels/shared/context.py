@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from viewsphere.errors import PluginError
 from viewsphere.geometry.box import Bounds, is_behind, projected_bounds
 from viewsphere.geometry.camera import inverse_camera_matrix
+from viewsphere.geometry.seam import turns
 from viewsphere.labels.shared.needs import Need, OwnView, Partner
 from viewsphere.labels.shared.placement import Placement
 from viewsphere.model.fields.frozen import Frozen
@@ -190,7 +191,10 @@ class LabelContext:
         own = self.projected[i][0]
         if own is not None:
             (left, top, right, bottom), (x0, y0, x1, y1) = own, self._reaches.T
-            meets = (left < x1) & (x0 < right) & (top < y1) & (y0 < bottom)
+            beside = (top < y1) & (y0 < bottom)
+            meets = np.zeros(len(beside), np.bool_)
+            for turn in turns(self.camera.lens.period):
+                meets |= beside & (left + turn < x1) & (x0 < right + turn)
             meets[i] = False
             if meets.any():
                 return False
@@ -214,6 +218,8 @@ class LabelContext:
         width, height = self.camera.width, self.camera.height
         own, whole = self.projected[i]
         x0, y0, x1, y1 = own if own and whole else EVERYWHERE
+        if self.camera.lens.period is not None and x1 > width:
+            x0, x1 = 0.0, float(width)  # a full turn has no canvas beside it
         left, top = math.floor(max(x0, -width)), math.floor(max(y0, -height))
         right, bottom = math.ceil(min(x1, 2 * width)), math.ceil(min(y1, 2 * height))
         if right <= left or bottom <= top:

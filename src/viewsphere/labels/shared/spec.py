@@ -105,6 +105,10 @@ class LabelSpec(Spec):
         "recomputes every label",
     )
     drawing: InstanceOf[Drawing] | None = described(default=None, description="the `Drawing` of previews and reports")
+    panoramas: bool = described(
+        default=True,
+        description="whether it is defined in panoramas; False for labels of z-depth, and of left and right in the picture",
+    )
     names_categories: bool = described(
         default=False,
         description="whether its text contains names of categories, which merging must then not change",
@@ -247,6 +251,11 @@ class SampleLabel(LabelSpec):
 def rendered(sample: Sample) -> list[ObjectAnnotation]:
     """The objects that were not imported."""
     return [o for o in sample.objects if o.source is None]
+
+
+def period_of(sample: Sample) -> int | None:
+    """The width of a picture of a full turn, whose last column is beside its first one; None for others."""
+    return None if sample.known_camera is None else sample.known_camera.lens.period
 
 
 def channel_of(sample: Sample, name: str) -> Array | None:

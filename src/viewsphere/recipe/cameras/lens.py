@@ -21,8 +21,8 @@ def _read(value: Any) -> Any:
     if not isinstance(value, Mapping) or not isinstance(entry.get("model"), str):
         return value
     name = entry["model"]
-    if name not in plugins.names("lenses") or plugins.load(LensSpec, name).is_scan:
-        pictures = [other for other, spec in plugins.loadable(LensSpec).items() if not spec.is_scan]
+    if name not in plugins.names("lenses") or not _bends(plugins.load(LensSpec, name)):
+        pictures = [other for other, spec in plugins.loadable(LensSpec).items() if _bends(spec)]
         with error_at("model"):
             raise ValueError(one_of(name, pictures))
     parameters = plugins.load(LensSpec, name).parameters
@@ -32,11 +32,16 @@ def _read(value: Any) -> Any:
         raise explained(error, tuple(parameters.model_fields)) from None
 
 
+def _bends(spec: LensSpec) -> bool:
+    """Return whether a lens can follow from an angle or a focal length; others have options instead."""
+    return spec.has_depth and not spec.is_scan
+
+
 class _Schema:
     """The JSON schema of all shipped lenses: their names and their parameters."""
 
     def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
-        pictures = {name: spec for name, spec in plugins.loadable(LensSpec).items() if not spec.is_scan}
+        pictures = {name: spec for name, spec in plugins.loadable(LensSpec).items() if _bends(spec)}
         shipped = {name: spec for name, spec in pictures.items() if not plugins.is_third_party("lenses", name)}
         named = f"{', '.join(shipped)}, or a lens of your own"
         fields: dict[str, Any] = {"model": {"type": "string", "description": named}}

@@ -159,6 +159,11 @@ class CameraEntry(WithProjection):
         return self
 
     @property
+    def lacks_depth(self) -> bool:
+        """True if z-depth is not defined for the lens, as for a panorama."""
+        return self.projection is not None and not self.projection.has_depth
+
+    @property
     def is_random(self) -> bool:
         """True if any part of the lens is drawn."""
         return is_random(self)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from viewsphere import plugins
 from viewsphere.errors import UserError
 from viewsphere.formats import Scope
-from viewsphere.formats.shared.writing.refusals import lacking_labels
+from viewsphere.formats.shared.writing.refusals import depth_lenses, lacking_labels
 from viewsphere.labels import label_named, label_names
 from viewsphere.model.channel import PASSES, missing
 from viewsphere.model.sample import Sample
@@ -120,6 +120,8 @@ def refusals(spec: FormatSpec, entry: FormatEntry, scope: Scope) -> Iterator[str
 
 def not_held(spec: FormatSpec, entry: FormatEntry, scope: Scope) -> Iterator[str]:
     """Yield the same reasons except for a LiDAR's frames, which a planned run checks by its sensors' channels."""
+    if not spec.panoramas:
+        yield from depth_lenses(scope)
     if spec.refuses is not None:
         yield from spec.refuses(scope, *entry.arguments())
 

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from viewsphere.geometry.camera import project
 from viewsphere.geometry.rotation import product, transform
+from viewsphere.geometry.seam import short_way
 from viewsphere.truth.correspondences.maps import Maps, maps_between
 from viewsphere.truth.kernel_constants import OTHER, STILL
 from viewsphere.truth.raster.visibility import Visibility
@@ -67,8 +68,18 @@ class Match:
             seen, owners, inverse, _, kinds = self._pixels
             maps = self._maps.projected(self.view, self.other)
             kernels.flow_on_pinhole(seen, owners, inverse, kinds, maps, out.reshape(-1))
+        elif self.other.camera.lens.period is not None:
+            out[...] = self.offset
         else:
             kernels.from_centers(self.xy.reshape(-1), self._inverse.shape[1], out.reshape(-1))
+        return out
+
+    @property
+    def offset(self) -> Float:
+        """The offset of `xy` from the centres of the pixels, (H, W, 2), by the shorter way around a full turn."""
+        out, period = self.xy - pixel_centers(self._inverse.shape), self.other.camera.lens.period
+        if period is not None:
+            out[..., 0] = short_way(out[..., 0], period)
         return out
 
     @cached_property

@@ -88,6 +88,8 @@ def edge_samples(
     normals = geometry.triangle_normals_of(np.flatnonzero(~left_out(geometry, q)).tolist())
     look = visibility.triangle, visibility.inverse_depth, owner, normals
     marks = _differs_from_neighbour(*look)
+    if camera.lens.period is not None:
+        _mark_across_seam(marks, *look)
     marks[: len(behind)] |= behind
     if camera.lens.is_linear:
         pixels, position, triangle, inverse = _pinhole_edges(geometry, visibility, marks, q, owner, normals, behind)
@@ -295,6 +297,18 @@ def _differs_from_neighbour(triangle: Int32, depth: Float32, owner: Int32, norma
     marks[: size - 1] |= beside[1:size]
     marks[: size - width] |= above[width:size]
     return marks
+
+
+def _mark_across_seam(marks: Marks, triangle: Int32, depth: Float32, owner: Int32, normals: Float32) -> None:
+    """Mark the pixels of the first and the last column that look different from their neighbour across the seam."""
+    height, width = triangle.shape
+    ends = [np.ascontiguousarray(picture[:, [-1, 0]]) for picture in (triangle, depth)]
+    columns, room = np.zeros((2, height * 2 + 8), np.uint8), (np.zeros((8, 18), np.float32), np.zeros((4, 18), np.int32))
+    kernels_chosen.compare(*ends, owner, normals, *room, *columns)
+    differs = columns[0][1 : 2 * height : 2]
+    pixels = marks[: height * width].reshape(height, width)
+    pixels[:, 0] |= differs
+    pixels[:, -1] |= differs
 
 
 def _pinhole_edges(

@@ -87,6 +87,13 @@ def pinhole(scope: Scope) -> Iterator[str]:
             yield f"expected pinhole cameras; found the lens of {name}"
 
 
+def depth_lenses(scope: Scope) -> Iterator[str]:
+    """Reasons to refuse, for a format without panoramas."""
+    for name, lens in lenses(scope):
+        if not lens.lens.has_depth:
+            yield f"expected lenses with z-depth; found the panorama ({lens.lens.name}) of {name}"
+
+
 def opencv_lenses(scope: Scope) -> Iterator[str]:
     """Reasons to refuse, for a format with only OpenCV's lens models."""
     for name, lens in lenses(scope):

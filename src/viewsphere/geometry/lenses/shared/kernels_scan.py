@@ -15,7 +15,7 @@ from viewsphere.kernels.jit import inner, njit
 
 
 @inner
-def _steepest(a, b, lowest, highest):
+def steepest(a, b, lowest, highest):
     """The range of elevations grown by those between two directions."""
     nx, ny, nz = a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
     steepest = math.atan2(math.sqrt(nx * nx + nz * nz), abs(ny))  # of the circle that the arc is a part of
@@ -32,7 +32,7 @@ def _steepest(a, b, lowest, highest):
 
 
 @inner
-def _is_above(a, b, c):
+def is_above(a, b, c):
     """Return whether the plane of a triangle passes above the centre rather than below it."""
     ux, uy, uz = b[0] - a[0], b[1] - a[1], b[2] - a[2]
     vx, vy, vz = c[0] - a[0], c[1] - a[1], c[2] - a[2]
@@ -60,14 +60,14 @@ def bounds(vertices, is_used, triangles, r, t, k, room):
         around = 0.0
         for c in range(3):
             a, b = room[triangles[f, c]], room[triangles[f, (c + 1) % 3]]
-            lowest, highest = _steepest(a, b, lowest, highest)
+            lowest, highest = steepest(a, b, lowest, highest)
             turned = b[3] - a[3]
             if abs(turned) > math.pi:
                 left, right = -math.pi, math.pi
                 turned -= math.copysign(2.0 * math.pi, turned)
             around += turned
         if abs(around) > math.pi:  # it is above or below the centre
-            if _is_above(room[triangles[f, 0]], room[triangles[f, 1]], room[triangles[f, 2]]):
+            if is_above(room[triangles[f, 0]], room[triangles[f, 1]], room[triangles[f, 2]]):
                 highest = 0.5 * math.pi
             else:
                 lowest = -0.5 * math.pi

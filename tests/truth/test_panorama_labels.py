@@ -1,0 +1,95 @@
+"""Panoramas: labels against Embree's rays and float64 brute force, masks and boxes across the seam, flow the short way."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from test_embree import embree, planes, right_by_float64, trace, turned
+
+from proven import close, equal
+from truth_scenes import cast, cube, orbit_camera, placed, random_soup, sphere
+from viewsphere.geometry.camera import pixel_rays
+from viewsphere.labels import observe
+from viewsphere.model.sensors.camera import Camera
+from viewsphere.recipe.world.scene import CameraEntry
+from viewsphere.truth.raster.visibility import rasterize
+
+LENSES = {
+    "equirectangular": {"projection": "equirectangular", "size": [128, 64]},
+    "equirectangular part": {"projection": "equirectangular", "size": [100, 60], "span": {"horizontal": 250}},
+    "cylindrical": {"projection": "cylindrical", "size": [128, 60]},
+    "cylindrical part": {"projection": "cylindrical", "size": [90, 90], "span": {"horizontal": 120}},
+}
+WANTED = ("instances", "depth_ray", "normals_geometric", "position")
+
+
+def lens(name, times=1):
+    camera = LENSES[name]
+    return CameraEntry.model_validate({**camera, "size": [times * n for n in camera["size"]]}).intrinsics
+
+
+def surroundings():
+    """Balls and cubes all around the origin, above and below, on a ground."""
+    places = [turned(0.3 * i, *(2.5 * np.array([np.cos(i), np.sin(i), 0.7 * np.cos(2.1 * i)])).tolist()) for i in range(9)]
+    meshes = [sphere(3, 0.6) if i % 2 else cube(0.5) for i in range(9)]
+    return placed(*meshes, cube(0.4), cube(0.4), moves=[*places, turned(0.2, 0, 0, 2), turned(0.2, 0.1, 0, -2)], ground=True)
+
+
+@pytest.mark.parametrize("name", LENSES)
+def test_brute_force_sees_the_same(name):
+    geometry = placed(random_soup(np.random.default_rng(3), 60), ground=True)
+    camera = orbit_camera(lens(name), 0.4, 0.2, 0.5, tilt=0.3)
+    seen = rasterize(geometry, camera, keeps_exact=True)
+    which, s, margin, gap = cast(geometry, camera)
+    certain = (margin > 1e-9) & (gap > 1e-6)
+    assert certain.mean() > 0.99
+    equal("triangles", "float64 brute force", seen.triangle[certain], which[certain])
+    hit = certain & (which >= 0)
+    close("1/s", "float64 brute force", seen.exact[hit], 1 / s[hit], "1/m", rtol=1e-9)
+
+
+@pytest.mark.parametrize("name", LENSES)
+def test_embree_sees_the_same(name):
+    pytest.importorskip("embreex")
+    geometry = surroundings()
+    scene, wrong = embree(geometry), 0
+    for azimuth in (0.3, 2.9):
+        camera = orbit_camera(lens(name, 3), azimuth, 0.1, 0.4, tilt=0.2)
+        seen = rasterize(geometry, camera)
+        labels = observe(geometry, camera, seen, WANTED)
+        other, distance = trace(scene, camera)
+        rays = pixel_rays(camera.intrinsics)
+        differs = other != seen.triangle
+        own, theirs, ray = seen.triangle[differs], other[differs], rays[differs]
+        (s_own, d_own), (s_other, d_other) = (planes(geometry, camera, t, ray) for t in (own, theirs))
+        with np.errstate(invalid="ignore"):
+            tie = np.abs(s_own - s_other) <= 1e-6 * np.minimum(np.abs(s_own), np.abs(s_other))
+        toss_up = tie | (np.minimum(d_own, d_other) < 1e-3)
+        wrong += sum(not right_by_float64(geometry, camera, ray[i], own[i]) for i in np.flatnonzero(~toss_up))
+        hit = ~differs & (other >= 0)
+        corners = geometry.corners(other[hit])
+        normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        normal /= np.linalg.norm(normal, axis=1)[:, None]
+        away = rays[hit] @ camera.R
+        normal *= -np.sign((normal * away).sum(axis=1))[:, None]
+        equal("instances", "Embree's rays", labels["instances"][hit], np.maximum(geometry.triangle_object[other[hit]], 0))
+        object_hit = labels["instances"][hit] > 0  # Embree's distances to the ground have float32's rounding of far corners
+        close("depth_ray", "Embree's rays", labels["depth_ray"][hit][object_hit], distance[hit][object_hit], "m", rtol=1e-5)
+        place = camera.center + away * distance[hit][:, None]
+        close("position", "Embree's rays", labels["position"][hit][object_hit], place[object_hit], "m", atol=1e-4)
+        np.testing.assert_allclose((labels["normals_geometric"][hit] * (normal @ camera.R.T)).sum(axis=1), 1, atol=1e-5)
+        assert hit.mean() > 0.4
+    assert wrong == 0
+
+
+def test_a_quarter_turn_of_the_camera_moves_all_columns_by_a_quarter():
+    """About the camera's own vertical axis: ids and distances are the same, but for rays along edges."""
+    geometry, own = surroundings(), lens("equirectangular", 3)
+    first = orbit_camera(own, 0.3, 0.1, 0.4)
+    turn = np.array([[0.0, 0, -1], [0, 1, 0], [1, 0, 0]])  # the right side comes ahead
+    second = Camera(own, turn @ first.R, turn @ first.t)
+    a, b = (rasterize(geometry, camera) for camera in (first, second))
+    quarter = own.width // 4
+    same = b.triangle == np.roll(a.triangle, -quarter, axis=1)
+    assert (~same).sum() <= 2
+    np.testing.assert_allclose(b.inverse_depth[same], np.roll(a.inverse_depth, -quarter, axis=1)[same], rtol=1e-6)
