@@ -72,7 +72,7 @@ def test_a_python_without_blender_is_one_line(tmp_path):
     bare.chmod(0o755)
     for python in (bare, tmp_path / "none"):
         with pytest.raises((UserError, MissingExtraError), match=str(python)) as caught:
-            cycles.check({"python": str(python)})
+            cycles.ENGINE.check({"python": str(python)})
             stage = cycles.stage(shot_of(engine={"name": "cycles", "python": str(python)}), stages().model).arrangement(0)
             stage.keeper.process_for(stage)
         assert "\n" not in str(caught.value)

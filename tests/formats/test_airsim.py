@@ -14,7 +14,7 @@ from scipy.spatial.transform import Rotation
 
 from proven import close, equal
 from viewsphere.errors import UserError
-from viewsphere.formats.airsim import KINDS, AirSim, Options, needs, refuses
+from viewsphere.formats.airsim import FORMAT, KINDS, AirSim
 from viewsphere.recipe.formats import FormatEntry
 from viewsphere.run.exports.exporting import export
 from viewsphere.run.exports.preparing import Views
@@ -90,20 +90,20 @@ def test_settings(both):
 
 
 def test_a_lens_that_zooms_is_an_error(stills):
-    tree = AirSim(stills, Options())
+    tree = AirSim(stills, FORMAT.options())
     with pytest.raises(UserError, match="expected sensors of one lens each; found several in train"):
         tree.layout("train/settings.json", {'["a", 1]': 1, '["a", 2]': 1})
 
 
 def test_what_it_needs_and_refuses(stills, videos):
-    assert needs(Options(images=("scene",))) == ()
-    assert needs(Options()) == ("depth", "instances")
+    assert FORMAT.needs(FORMAT.options(images=("scene",))) == ()
+    assert FORMAT.needs(FORMAT.options()) == ("depth", "instances")
     with pytest.raises(ValidationError):
-        Options(images=("lidar",))
+        FORMAT.options(images=("lidar",))
     scope = scope_of(stills)
-    assert list(refuses(scope, Options())) == []
+    assert list(FORMAT.refuses(scope, FORMAT.options())) == []
     told = "expected two rectified cameras (rig: {kind: stereo, baseline: 0.1}); found camera"
-    assert list(refuses(scope, Options(images=("disparity_normalized",)))) == [told]
+    assert list(FORMAT.refuses(scope, FORMAT.options(images=("disparity_normalized",)))) == [told]
     many = replace(scope, most_objects=300)
-    assert list(refuses(many, Options())) == ["expected at most 255 objects in a picture; found 300"]
-    assert list(refuses(many, Options(images=("scene", "depth_planar")))) == []
+    assert list(FORMAT.refuses(many, FORMAT.options())) == ["expected at most 255 objects in a picture; found 300"]
+    assert list(FORMAT.refuses(many, FORMAT.options(images=("scene", "depth_planar")))) == []

@@ -24,7 +24,7 @@ from quick import quick
 from viewsphere import Dataset, generate
 from viewsphere.errors import UserError
 from viewsphere.formats import bop
-from viewsphere.formats.bop import Options
+from viewsphere.formats.bop import FORMAT
 from viewsphere.geometry.mask import decode_rle
 from viewsphere.run.exports.exporting import export
 from worlds import poses, stills
@@ -373,7 +373,7 @@ def test_bop_toolkit_agrees(stills, shapes, written):
 
 def made(dataset, folder, sample, **options):
     """What is said of a sample, by the files that say it."""
-    pieces = bop.preparer(dataset, folder, Options(**options))(sample)
+    pieces = bop.preparer(dataset, folder, FORMAT.options(**options))(sample)
     files = ((piece.path.rpartition("/")[2], piece.data) for piece in pieces)
     return {name: json.loads(b"{" + data + b"}") for name, data in files if name in ("scene_camera.json", *SAID)}
 
@@ -383,7 +383,7 @@ def test_a_picture_of_nothing_has_empty_lists(stills, tmp_path):
     said = made(stills, tmp_path, empty)
     assert said["scene_gt.json"] == said["scene_gt_info.json"] == {str(empty.index): []}
     assert not (tmp_path / "train" / "000000" / "mask").exists()
-    bop.preparer(stills, tmp_path / "single", Options(layout="imagewise"))(empty)
+    bop.preparer(stills, tmp_path / "single", FORMAT.options(layout="imagewise"))(empty)
     assert json.loads((tmp_path / "single" / "train" / "000000" / f"000000_{empty.index:06d}.mask.json").read_text()) == {}
 
 
@@ -435,7 +435,7 @@ def test_refusals(stills):
         _planned(camera={"size": [160, 120], "fov_deg": 50, **lens}, formats=["bop"])
     with pytest.raises(UserError, match=r"bop: expected rigid models; found walker, which deforms"):
         step = replace(stills.models[0], key="walker@1", track="walker", step=SimpleNamespace(frame=1))
-        bop.Bop(SimpleNamespace(models=(step,), plan=stills.plan), Options())
+        bop.Bop(SimpleNamespace(models=(step,), plan=stills.plan), FORMAT.options())
 
 
 def _planned(**changes):

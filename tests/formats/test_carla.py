@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from proven import close, equal
-from viewsphere.formats.carla import TAGS, Carla, refuses, transform
+from viewsphere.formats.carla import FORMAT, TAGS, Carla, transform
 from viewsphere.model.sensors.camera import Intrinsics
 from viewsphere.model.sensors.rig import Rig
 from viewsphere.run.exports.exporting import export
@@ -115,8 +115,10 @@ def test_nothing_but_sky(stills):
 
 def test_what_it_refuses(stills):
     scope = scope_of(stills)
-    assert list(refuses(scope)) == []
+    assert list(FORMAT.refuses(scope)) == []
     lens = Intrinsics(width=4, height=4, fx=1, fy=1, cx=2.5, cy=2)
     told = "expected square pixels and a principal point in the picture's middle; found others of camera"
-    assert list(refuses(replace(scope, rig=Rig.single(lens)))) == [told]
-    assert list(refuses(replace(scope, most_objects=70000))) == ["expected at most 65,535 objects in a picture; found 70,000"]
+    assert list(FORMAT.refuses(replace(scope, rig=Rig.single(lens)))) == [told]
+    assert list(FORMAT.refuses(replace(scope, most_objects=70000))) == [
+        "expected at most 65,535 objects in a picture; found 70,000"
+    ]

@@ -10,7 +10,7 @@ from pycocotools.cocoeval import COCOeval
 
 from cube_dataset import MESHES, make
 from viewsphere.errors import UserError
-from viewsphere.formats.coco import verify
+from viewsphere.formats.coco import FORMAT
 from viewsphere.formats.coco.categories import CATEGORY_IDS, Options, category_ids, official_ids
 from viewsphere.geometry.mask import encode_rle
 from viewsphere.recipe.formats import FormatEntry
@@ -250,9 +250,9 @@ def test_captions_are_coco_s(tmp_path):
         assert {i: [one["caption"] for one in coco.imgToAnns[i]] for i in coco.imgs} == {i: told.pop(i) for i in coco.imgs}
         assert coco.dataset["images"] == load(folder, split).dataset["images"]
     assert not told
-    assert not list(verify(dataset, folder, range(4), Options()))
+    assert not list(FORMAT.verify(dataset, folder, range(4), Options()))
     file.write_text(file.read_text().replace("picture", "image", 1).replace("be seen", "be heard", 1))
-    assert list(verify(dataset, folder, range(4), Options()))
+    assert list(FORMAT.verify(dataset, folder, range(4), Options()))
 
 
 def test_without_captions_there_is_no_file_of_them(exported):

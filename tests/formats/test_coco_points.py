@@ -16,7 +16,7 @@ from pycocotools.cocoeval import COCOeval
 from torchvision_readers import torchvision_datasets
 
 from proven import close, equal
-from viewsphere.formats.coco import Options, verify
+from viewsphere.formats.coco import FORMAT, Options
 from viewsphere.run.exports.exporting import export
 
 
@@ -157,11 +157,11 @@ def changed_points(annotation):
 def test_changed_fields_are_found(stills, rle, tmp_path, change, told):
     folder = shutil.copytree(rle, tmp_path / "coco")
     options, file = Options(segmentation="rle"), folder / "annotations" / "instances_train.json"
-    assert not list(verify(stills, folder, range(len(stills)), options))
+    assert not list(FORMAT.verify(stills, folder, range(len(stills)), options))
     value = json.loads(file.read_text())
     change(next(a for a in value["annotations"] if a["num_keypoints"]))
     file.write_text(json.dumps(value))
-    assert any(told in message for _, message in verify(stills, folder, (), options))
+    assert any(told in message for _, message in FORMAT.verify(stills, folder, (), options))
 
 
 def test_pycocotools_finds_moved_points(stills, rle, tmp_path):

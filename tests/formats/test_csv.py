@@ -8,7 +8,7 @@ import pytest
 from PIL import Image
 
 from cube_dataset import make
-from viewsphere.formats.csv import HEAD, Options, _rows, verify
+from viewsphere.formats.csv import FORMAT, HEAD, _rows
 from viewsphere.recipe.formats import FormatEntry
 from viewsphere.run.exports.exporting import write
 
@@ -52,12 +52,12 @@ def test_rows_are_the_objects(exported):
 
 def test_its_proof_names_the_frame(exported):
     dataset, folder, rows = exported
-    assert list(verify(dataset, folder, (), Options())) == []
+    assert list(FORMAT.verify(dataset, folder, (), FORMAT.options())) == []
     table = folder / "objects.csv"
     text = table.read_text("utf-8")
     head, last = text.rstrip().rsplit("\n", 1)
     table.write_text(f"{head}\n{last.replace(rows[-1]['area'], '1234567')}\n", "utf-8", newline="\n")
-    (frame, line), *more = verify(dataset, folder, (), Options())
+    (frame, line), *more = FORMAT.verify(dataset, folder, (), FORMAT.options())
     assert more == []
     assert frame == int(rows[-1]["index"])
     assert "objects.csv: row" in line
@@ -69,7 +69,7 @@ def test_no_text_is_a_formula_unless_asked_for(exported, text):
     dataset, _, _ = exported
     sample = dataset[0]
     evil = replace(sample, split=text, objects=tuple(replace(o, category=text) for o in sample.objects))
-    (row, *_), (plain, *_) = _rows(evil, Options()), _rows(evil, Options(safe=False))
+    (row, *_), (plain, *_) = _rows(evil, FORMAT.options()), _rows(evil, FORMAT.options(safe=False))
     at = HEAD.index("split"), HEAD.index("category")
     assert [row[i] for i in at] == [f"'{text}"] * 2
     assert [plain[i] for i in at] == [text] * 2

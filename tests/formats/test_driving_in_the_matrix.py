@@ -10,7 +10,7 @@ import pytest
 import supervision
 
 from proven import close, equal
-from viewsphere.formats.driving_in_the_matrix import Matrix, Options, refuses
+from viewsphere.formats.driving_in_the_matrix import FORMAT, Matrix
 from viewsphere.run.exports.exporting import export
 from viewsphere.run.exports.scope import scope_of
 from viewsphere.store import Category
@@ -59,7 +59,7 @@ def test_lists_and_flags(stills, written):
 
 
 def test_odd_names_and_empty_pictures(stills):
-    tree = Matrix(stills, Options())
+    tree = Matrix(stills, FORMAT.options())
     odd = replace(stills[0], objects=(replace(stills[0].objects[0], category="Bäume <'&\"> x"),))
     xml = next(one for one in tree.sample_files(odd) if one.path.endswith(".xml")).content
     assert ElementTree.fromstring(xml).find("object").findtext("name") == "bäume <'&\"> x"
@@ -69,6 +69,6 @@ def test_odd_names_and_empty_pictures(stills):
 
 def test_what_it_refuses(stills):
     scope = scope_of(stills)
-    assert list(refuses(scope, Options())) == []
-    (told,) = refuses(replace(scope, categories=(Category(1, "a\nb", ""),)), Options())
+    assert list(FORMAT.refuses(scope, FORMAT.options())) == []
+    (told,) = FORMAT.refuses(replace(scope, categories=(Category(1, "a\nb", ""),)), FORMAT.options())
     assert told.endswith("found 'a\\nb'")

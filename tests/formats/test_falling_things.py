@@ -18,7 +18,7 @@ from proven import close, equal
 from quick import quick
 from viewsphere.errors import UserError
 from viewsphere.formats import falling_things
-from viewsphere.formats.falling_things import Options
+from viewsphere.formats.falling_things import FORMAT
 from viewsphere.geometry.mask import decode_rle
 from viewsphere.model.sensors.rig import Rig, Sensor
 from viewsphere.run.exports.exporting import export
@@ -162,7 +162,7 @@ def test_torchvision_reads_stereo(videos, written):
 
 
 def made(dataset, folder, sample, **options):
-    falling_things.preparer(dataset, folder, Options(**options))(sample)
+    falling_things.preparer(dataset, folder, FORMAT.options(**options))(sample)
     (said,) = [file for file in folder.rglob("*.json") if not file.name.startswith("_")]
     return json.loads(said.read_text())
 
@@ -190,11 +190,11 @@ def test_refusals(stills, drives):
     lens = stills[0].camera.intrinsics
     side = Sensor(name="side", intrinsics=lens, rig_from_sensor=[[0, 0, 1, 0], [0, 1, 0, 0], [-1, 0, 0, 0], [0, 0, 0, 1]])
     rig = Rig(sensors=(Sensor(name="front", intrinsics=lens), side))
-    (found,) = falling_things.refuses(SimpleNamespace(rig=rig, pictures=()), Options())
+    (found,) = falling_things.FORMAT.refuses(SimpleNamespace(rig=rig, pictures=()), FORMAT.options())
     assert found == "expected one camera or a rectified pair; found front, side"
-    assert list(falling_things.refuses(SimpleNamespace(rig=None, pictures=()), Options())) == []
+    assert list(falling_things.FORMAT.refuses(SimpleNamespace(rig=None, pictures=()), FORMAT.options())) == []
     with pytest.raises(UserError, match=r"falling_things: expected .*; found"):
         export(drives.root, "falling_things", output=drives.root.parent / "refused")
     many = SimpleNamespace(plan=SimpleNamespace(models=tuple(map(str, range(300)))))
     with pytest.raises(UserError, match=r"expected fewer than 255 models; found 300"):
-        falling_things.FallingThings(many, Options())
+        falling_things.FallingThings(many, FORMAT.options())

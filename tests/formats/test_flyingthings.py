@@ -147,7 +147,7 @@ def test_ptlflow_reads_flow_and_occlusions(videos, written):
 
 
 def test_material_indices_where_they_are_kept(videos, tmp_path):
-    tree = flyingthings.FlyingThings(videos, flyingthings.Options(set="monkaa"))
+    tree = flyingthings.FlyingThings(videos, flyingthings.FORMAT.options(set="monkaa"))
     numbers = np.arange(160 * 120, dtype=np.int32).reshape(120, 160) % 7
     made = files(tree, with_channels(videos[0], materials=numbers))
     (tmp_path / "m.pfm").write_bytes(made[f"material_index/{videos[0].sequence}/left/0000.pfm"])
@@ -155,7 +155,7 @@ def test_material_indices_where_they_are_kept(videos, tmp_path):
 
 
 def test_a_picture_of_nothing(videos, tmp_path):
-    tree = flyingthings.FlyingThings(videos, flyingthings.Options(set="monkaa"))
+    tree = flyingthings.FlyingThings(videos, flyingthings.FORMAT.options(set="monkaa"))
     for path, made in files(tree, empty(videos[0])).items():
         if path.endswith(".pfm"):
             (tmp_path / "a.pfm").write_bytes(made)
@@ -164,12 +164,12 @@ def test_a_picture_of_nothing(videos, tmp_path):
 
 
 def test_what_is_refused(videos, stills):
-    options, scope = flyingthings.Options(), scope_of(videos)
+    options, scope = flyingthings.FORMAT.options(), scope_of(videos)
     lone = scope.rig.model_copy(update={"sensors": scope.rig.sensors[:1]})
     third = scope.rig.sensors[1].model_copy(update={"name": "third"})
     three = scope.rig.model_copy(update={"sensors": (*scope.rig.sensors, third)})
-    assert list(flyingthings.refuses(scope, options)) == []
-    assert "expected sequences" in next(flyingthings.refuses(scope_of(stills), options))
-    one, other = (list(flyingthings.refuses(Scope(**{**vars(scope), "rig": rig}), options)) for rig in (lone, three))
+    assert list(flyingthings.FORMAT.refuses(scope, options)) == []
+    assert "expected sequences" in next(flyingthings.FORMAT.refuses(scope_of(stills), options))
+    one, other = (list(flyingthings.FORMAT.refuses(Scope(**{**vars(scope), "rig": rig}), options)) for rig in (lone, three))
     assert one == ["expected two rectified cameras (rig: {kind: stereo, baseline: 0.1}); found left"]
     assert other == ["expected one camera, or two that are rectified; found left, right, third"]

@@ -16,7 +16,7 @@ from truth_scenes import LENSES
 from viewsphere import Dataset, generate
 from viewsphere.assets.exporting.exported import read_exported
 from viewsphere.check import check
-from viewsphere.formats.gltf import verify
+from viewsphere.formats.gltf import FORMAT
 from viewsphere.geometry.camera import project
 from viewsphere.geometry.rotation import transform
 from viewsphere.recipe.formats import FormatEntry
@@ -77,7 +77,7 @@ def test_several_objects(tmp_path):
     scenes = exported(dataset, tmp_path / "gltf")
     assert set(scenes.values()) == {"00000000.glb"} and set(scenes) == {sample.index for sample in dataset}
     compare(dataset, dataset[0], tmp_path / "gltf" / "00000000.glb")
-    assert list(verify(dataset, tmp_path / "gltf", ())) == []
+    assert list(FORMAT.verify(dataset, tmp_path / "gltf", ())) == []
 
 
 def test_each_model_is_a_scene_of_its_own(tmp_path):
@@ -94,13 +94,13 @@ def test_its_proof_notices_other_bytes_and_rows(tmp_path):
     file, table = folder / "00000004.glb", folder / "frames.csv"
     whole, rows = file.read_bytes(), table.read_bytes()
     file.write_bytes(whole.replace(b'"category_id":2', b'"category_id":3'))
-    assert [frame for frame, _ in verify(dataset, folder, ())] == [4]
+    assert [frame for frame, _ in FORMAT.verify(dataset, folder, ())] == [4]
     file.write_bytes(whole)
     table.write_bytes(rows.replace(b"5,00000004", b"5,00000008"))
-    assert len(list(verify(dataset, folder, ()))) == 1
+    assert len(list(FORMAT.verify(dataset, folder, ()))) == 1
     table.write_bytes(rows)
     file.unlink()
-    assert len(list(verify(dataset, folder, ()))) == 1
+    assert len(list(FORMAT.verify(dataset, folder, ()))) == 1
 
 
 def test_models_of_the_zoo_turned_and_with_textures(tmp_path):

@@ -13,7 +13,7 @@ from torchvision_readers import torchvision_datasets
 from proven import close, equal
 from viewsphere import Dataset, generate
 from viewsphere.errors import UserError
-from viewsphere.formats.imagefolder import Options, refuses
+from viewsphere.formats.imagefolder import FORMAT
 from viewsphere.run.exports.exporting import export
 from viewsphere.run.exports.scope import scope_of
 from worlds import poses as recipe
@@ -137,14 +137,14 @@ def named(dataset, *names):
 
 
 def test_what_it_refuses(poses):
-    assert list(refuses(named(poses, "é" * 128), Options())) == [
+    assert list(FORMAT.refuses(named(poses, "é" * 128), FORMAT.options())) == [
         f"expected names of categories that fit a folder's, 1 to 255 bytes; found {'é' * 128!r}"
     ]
-    assert list(refuses(named(poses, "Car", "car"), Options())) == [
+    assert list(FORMAT.refuses(named(poses, "Car", "car"), FORMAT.options())) == [
         "expected names of categories that differ in more than case and signs; found Car, car"
     ]
-    assert list(refuses(named(poses, "Car", "car"), Options(by="pose_category"))) == []
-    assert list(refuses(scoped(poses, splits=("a b", "a-b")), Options())) == [
+    assert list(FORMAT.refuses(named(poses, "Car", "car"), FORMAT.options(by="pose_category"))) == []
+    assert list(FORMAT.refuses(scoped(poses, splits=("a b", "a-b")), FORMAT.options())) == [
         "expected names of splits that differ in more than case and signs; found a_b, a_b"
     ]
 
@@ -155,4 +155,4 @@ def test_objects_without_a_pose_have_no_pose_category(poses):
     sample = poses[0]
     unknown = replace(sample, objects=tuple(replace(o, pose_category="") for o in sample.objects))
     with pytest.raises(UserError, match=r"imagefolder: expected the pose_category of object 1; found none .frame 0."):
-        list(ImageFolder(poses, Options(by="pose_category")).sample_files(unknown))
+        list(ImageFolder(poses, FORMAT.options(by="pose_category")).sample_files(unknown))

@@ -74,6 +74,8 @@ def test_what_is_refused(videos, stills):
     scope = scope_of(videos)
     third = scope.rig.sensors[1].model_copy(update={"name": "third"})
     three = Scope(**{**vars(scope), "rig": scope.rig.model_copy(update={"sensors": (*scope.rig.sensors, third)})})
-    assert list(kitti_depth.refuses(scope)) == []
-    assert "expected sequences" in next(kitti_depth.refuses(scope_of(stills)))
-    assert list(kitti_depth.refuses(three)) == ["expected one camera, or two that are rectified; found left, right, third"]
+    assert list(kitti_depth.FORMAT.refuses(scope)) == []
+    assert "expected sequences" in next(kitti_depth.FORMAT.refuses(scope_of(stills)))
+    assert list(kitti_depth.FORMAT.refuses(three)) == [
+        "expected one camera, or two that are rectified; found left, right, third"
+    ]

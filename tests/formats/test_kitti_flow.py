@@ -193,7 +193,7 @@ def read(tree, sample, name, tmp_path, reader):
 
 
 def test_what_has_no_number_is_not_valid(videos, tmp_path):
-    tree, still = kitti_flow.KittiFlow(videos, kitti_flow.Options()), np.zeros((120, 160, 2), np.float32)
+    tree, still = kitti_flow.KittiFlow(videos, kitti_flow.FORMAT.options()), np.zeros((120, 160, 2), np.float32)
     still[0, :4, 0] = (-512, 511.984375, 511.99, -512.1)
     changed = with_channels(videos[0], flow=still, flow_state=np.zeros((120, 160), np.uint8))
     flow, valid = read(tree, changed, "flow_occ", tmp_path, read_flow_png)
@@ -206,7 +206,7 @@ def test_what_has_no_number_is_not_valid(videos, tmp_path):
 
 
 def test_a_picture_of_nothing(videos, tmp_path):
-    tree, nothing = kitti_flow.KittiFlow(videos, kitti_flow.Options()), empty(videos[0])
+    tree, nothing = kitti_flow.KittiFlow(videos, kitti_flow.FORMAT.options()), empty(videos[0])
     for name in ("disp_occ_0", "disp_noc_0", "disp_occ_1", "disp_noc_1", "obj_map"):
         assert not read(tree, nothing, name, tmp_path, read_picture).any()
     assert not read(tree, nothing, "flow_occ", tmp_path, read_flow_png)[1].any()
@@ -215,16 +215,16 @@ def test_a_picture_of_nothing(videos, tmp_path):
 def test_the_split_test_is_for_testing(videos):
     from dataclasses import replace
 
-    tree = kitti_flow.KittiFlow(videos, kitti_flow.Options())
+    tree = kitti_flow.KittiFlow(videos, kitti_flow.FORMAT.options())
     assert all(path.startswith("testing/") for path in files(tree, replace(videos[0], split="test")))
 
 
 def test_what_is_refused(videos, stills):
-    new, old, scope = kitti_flow.Options(), kitti_flow.Options(set="stereo_flow_2012"), scope_of(videos)
+    new, old, scope = kitti_flow.FORMAT.options(), kitti_flow.FORMAT.options(set="stereo_flow_2012"), scope_of(videos)
     lone, many = ({"rig": scope.rig.model_copy(update={"sensors": scope.rig.sensors[:1]})}, {"most_objects": 256})
-    assert list(kitti_flow.refuses(scope, new)) == []
-    assert "expected sequences" in next(kitti_flow.refuses(scope_of(stills), new))
-    assert "expected two rectified cameras" in next(kitti_flow.refuses(Scope(**{**vars(scope), **lone}), old))
+    assert list(kitti_flow.FORMAT.refuses(scope, new)) == []
+    assert "expected sequences" in next(kitti_flow.FORMAT.refuses(scope_of(stills), new))
+    assert "expected two rectified cameras" in next(kitti_flow.FORMAT.refuses(Scope(**{**vars(scope), **lone}), old))
     crowd = Scope(**{**vars(scope), **many})
-    assert list(kitti_flow.refuses(crowd, new)) == ["expected at most 255 objects in a picture; found 256"]
-    assert list(kitti_flow.refuses(crowd, old)) == []
+    assert list(kitti_flow.FORMAT.refuses(crowd, new)) == ["expected at most 255 objects in a picture; found 256"]
+    assert list(kitti_flow.FORMAT.refuses(crowd, old)) == []

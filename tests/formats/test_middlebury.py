@@ -152,7 +152,7 @@ def test_still_pairs(tmp_path):
 
 
 def test_a_picture_of_nothing(videos, tmp_path):
-    tree = middlebury.Middlebury(videos, middlebury.Options())
+    tree = middlebury.Middlebury(videos, middlebury.FORMAT.options())
     made = files(tree, empty(videos[0]))
     for path, value in made.items():
         if path.endswith(".pfm"):
@@ -163,19 +163,19 @@ def test_a_picture_of_nothing(videos, tmp_path):
 
 
 def test_the_split_test_of_eth3d(videos):
-    tree = middlebury.Middlebury(videos, middlebury.Options(set="eth3d"))
+    tree = middlebury.Middlebury(videos, middlebury.FORMAT.options(set="eth3d"))
     roots = {path.split("/")[0] for path in files(tree, replace(videos[0], split="test"))}
     assert roots == {"two_view_test", "two_view_test_gt"}
 
 
 def test_what_is_refused(videos, stills):
-    scope, options = scope_of(videos), middlebury.Options()
+    scope, options = scope_of(videos), middlebury.FORMAT.options()
     third = scope.rig.sensors[1].model_copy(update={"name": "third"})
     three = Scope(**{**vars(scope), "rig": scope.rig.model_copy(update={"sensors": (*scope.rig.sensors, third)})})
-    assert list(middlebury.refuses(scope, options)) == []
-    assert list(middlebury.refuses(scope_of(stills), options)) == [
+    assert list(middlebury.FORMAT.refuses(scope, options)) == []
+    assert list(middlebury.FORMAT.refuses(scope_of(stills), options)) == [
         "expected two rectified cameras (rig: {kind: stereo, baseline: 0.1}); found camera"
     ]
-    assert list(middlebury.refuses(three, options)) == [
+    assert list(middlebury.FORMAT.refuses(three, options)) == [
         "expected one camera, or two that are rectified; found left, right, third"
     ]

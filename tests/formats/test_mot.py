@@ -147,11 +147,11 @@ def test_what_it_refuses(stills, tmp_path):
 def test_names_of_more_than_a_line_are_refused(videos, name):
     from dataclasses import replace
 
-    from viewsphere.formats.mot import Options, refuses
+    from viewsphere.formats.mot import FORMAT
     from viewsphere.run.exports.scope import scope_of
 
     scope = scope_of(videos)
     odd = replace(scope, categories=(replace(scope.categories[0], name=name),))
-    assert list(refuses(scope, Options())) == []
-    (problem,) = refuses(odd, Options())
+    assert list(FORMAT.refuses(scope, FORMAT.options())) == []
+    (problem,) = FORMAT.refuses(odd, FORMAT.options())
     assert problem.endswith(f"found {name!r}")

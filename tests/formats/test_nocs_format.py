@@ -12,7 +12,7 @@ import pytest
 from proven import close, equal
 from viewsphere import Dataset, generate
 from viewsphere.errors import UserError
-from viewsphere.formats.nocs import refuses
+from viewsphere.formats.nocs import FORMAT
 from viewsphere.run.exports.exporting import export
 from viewsphere.run.exports.scope import scope_of
 from worlds import stills as recipe
@@ -176,7 +176,7 @@ def test_what_it_refuses(stills, tmp_path):
 
     from viewsphere.formats.nocs import Nocs
 
-    assert list(refuses(replace(scope_of(stills), most_objects=255))) == [
+    assert list(FORMAT.refuses(replace(scope_of(stills), most_objects=255))) == [
         "expected at most 254 objects in a picture; found 255"
     ]
     with pytest.raises(UserError, match="nocs: expected channel nocs; found none of frame 0"):

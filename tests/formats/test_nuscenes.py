@@ -14,7 +14,7 @@ from scipy.spatial.transform import Rotation
 from proven import close, equal
 from viewsphere import Dataset, generate, plugins
 from viewsphere.errors import UserError
-from viewsphere.formats.nuscenes import Options
+from viewsphere.formats.nuscenes import FORMAT
 from viewsphere.plugins.format import FormatSpec
 from viewsphere.run.exports.exporting import export
 from viewsphere.store import Choice
@@ -180,7 +180,7 @@ def test_some_instants_and_sensors(drives, tmp_path):
     assert all(row["token"] in tokens for row in tables.rows["sample_annotation"])
     verify = plugins.load(FormatSpec, "nuscenes").verify
     chosen = Dataset(drives.root, Choice(frames=((20, 30),)))
-    assert list(verify(chosen, tmp_path / "nuscenes", range(len(chosen)), Options())) == []
+    assert list(verify(chosen, tmp_path / "nuscenes", range(len(chosen)), FORMAT.options())) == []
 
 
 def passing(**changes):

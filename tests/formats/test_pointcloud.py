@@ -13,7 +13,7 @@ from truth_scenes import LENSES
 from viewsphere import Dataset, generate
 from viewsphere.check import check
 from viewsphere.errors import StoreError, UserError
-from viewsphere.formats.pointcloud import Options, verify
+from viewsphere.formats.pointcloud import FORMAT
 from viewsphere.geometry.camera import project
 from viewsphere.geometry.lenses import lens_parameters
 from viewsphere.recipe.formats import FormatEntry
@@ -95,9 +95,9 @@ def test_trimesh_reads_the_clouds(dataset, tmp_path, axes):
         head = file.read_bytes().split(b"end_header\n")[0].decode().splitlines()
         assert f"comment viewsphere, frame {sample.index}" in head
         assert any(line.startswith(f"comment {axes} axes: ") and line.endswith("; metres") for line in head)
-    assert list(verify(dataset, folder, (), Options(axes=axes))) == []
+    assert list(FORMAT.verify(dataset, folder, (), FORMAT.options(axes=axes))) == []
     other = "world" if axes == "camera" else "camera"
-    assert len(list(verify(dataset, folder, (), Options(axes=other)))) == len(dataset)
+    assert len(list(FORMAT.verify(dataset, folder, (), FORMAT.options(axes=other)))) == len(dataset)
 
 
 def test_its_proof_names_the_frame(dataset, tmp_path):
@@ -107,7 +107,7 @@ def test_its_proof_names_the_frame(dataset, tmp_path):
     data[-1] ^= 1
     file.write_bytes(data)
     (folder / "more.ply").write_bytes(b"ply")
-    found = list(verify(dataset, folder, (), Options()))
+    found = list(FORMAT.verify(dataset, folder, (), FORMAT.options()))
     assert sorted(frame is None for frame, _ in found) == [False, True]
     assert dataset[1].index in dict(found)
 

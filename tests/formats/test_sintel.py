@@ -150,7 +150,7 @@ def test_without_stereo_one_eye_is_enough(videos, tmp_path):
 
 
 def test_albedo_where_it_is_kept(videos, tmp_path):
-    tree, light = sintel.Sintel(videos, sintel.Options()), np.random.default_rng(0).random((120, 160, 3), np.float32)
+    tree, light = sintel.Sintel(videos, sintel.FORMAT.options()), np.random.default_rng(0).random((120, 160, 3), np.float32)
     made = files(tree, with_channels(videos[0], albedo=light))
     (tmp_path / "a.png").write_bytes(made[f"training/albedo/{videos[0].sequence}/frame_0001.png"])
     curve = np.where(light <= 0.0031308, 12.92 * light, 1.055 * light ** (1 / 2.4) - 0.055)
@@ -158,7 +158,7 @@ def test_albedo_where_it_is_kept(videos, tmp_path):
 
 
 def test_a_picture_of_nothing(videos, tmp_path):
-    made = files(sintel.Sintel(videos, sintel.Options(stereo=True)), empty(videos[0]))
+    made = files(sintel.Sintel(videos, sintel.FORMAT.options(stereo=True)), empty(videos[0]))
     name = f"{videos[0].sequence}/frame_0001"
     (tmp_path / "a").write_bytes(made[f"training/flow/{name}.flo"])
     assert (read_tagged(tmp_path / "a", 2) == np.float32(1e10)).all()
@@ -172,7 +172,7 @@ def test_a_picture_of_nothing(videos, tmp_path):
 
 
 def test_disparity_has_a_limit(videos, tmp_path):
-    tree = sintel.Sintel(videos, sintel.Options(stereo=True))
+    tree = sintel.Sintel(videos, sintel.FORMAT.options(stereo=True))
     near = with_channels(videos[0], disparity=np.full((120, 160), 1023.9, np.float32))
     (tmp_path / "a.png").write_bytes(files(tree, near)[f"stereo/training/disparities/{videos[0].sequence}/frame_0001.png"])
     red, green, blue = np.moveaxis(read_picture(tmp_path / "a.png").astype(float), -1, 0)
@@ -186,18 +186,18 @@ def scope(videos, **changes):
 
 
 def test_what_is_refused(videos, stills):
-    plain, pairs = sintel.Options(), sintel.Options(stereo=True)
+    plain, pairs = sintel.FORMAT.options(), sintel.FORMAT.options(stereo=True)
     rig = scope_of(videos).rig
     lone = rig.model_copy(update={"sensors": rig.sensors[:1]})
     away = rig.sensors[1].model_copy(update={"rig_from_sensor": ((1, 0, 0, 0), (0, 1, 0, 0.1), (0, 0, 1, 0), (0, 0, 0, 1))})
     apart = rig.model_copy(update={"sensors": (rig.sensors[0], away)})
-    assert list(sintel.refuses(scope(videos), plain)) == list(sintel.refuses(scope(videos), pairs)) == []
-    assert list(sintel.refuses(scope(videos, rig=lone), plain)) == []
-    assert "expected sequences" in next(sintel.refuses(scope_of(stills), plain))
-    assert "expected two rectified cameras" in next(sintel.refuses(scope(videos, rig=lone), pairs))
-    found = list(sintel.refuses(scope(videos, rig=apart), plain))
+    assert list(sintel.FORMAT.refuses(scope(videos), plain)) == list(sintel.FORMAT.refuses(scope(videos), pairs)) == []
+    assert list(sintel.FORMAT.refuses(scope(videos, rig=lone), plain)) == []
+    assert "expected sequences" in next(sintel.FORMAT.refuses(scope_of(stills), plain))
+    assert "expected two rectified cameras" in next(sintel.FORMAT.refuses(scope(videos, rig=lone), pairs))
+    found = list(sintel.FORMAT.refuses(scope(videos, rig=apart), plain))
     assert found == ["expected one camera, or two that are rectified; found left, right"]
     bent = rig.sensors[0].model_copy(update={"intrinsics": BENT})
-    assert list(sintel.refuses(scope(videos, rig=rig.model_copy(update={"sensors": (bent,)})), plain)) == [
+    assert list(sintel.FORMAT.refuses(scope(videos, rig=rig.model_copy(update={"sensors": (bent,)})), plain)) == [
         "expected pinhole cameras; found the lens of left"
     ]

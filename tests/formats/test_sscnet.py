@@ -13,7 +13,7 @@ import pytest
 from proven import close, equal
 from viewsphere import Dataset, generate
 from viewsphere.errors import UserError
-from viewsphere.formats.sscnet import Sscnet, refuses
+from viewsphere.formats.sscnet import FORMAT, Sscnet
 from viewsphere.model.annotations.voxels import RUN
 from viewsphere.run.exports.exporting import export
 from viewsphere.run.exports.scope import scope_of
@@ -108,8 +108,8 @@ def test_nothing_at_all(both, tmp_path):
 
 def test_what_it_refuses(both, drives):
     dataset, _ = both
-    assert list(refuses(scope_of(dataset))) == []
-    assert list(refuses(scope_of(drives))) == ["expected cameras; found the LiDAR top"]
+    assert list(FORMAT.refuses(scope_of(dataset))) == []
+    assert list(FORMAT.refuses(scope_of(drives))) == ["expected cameras; found the LiDAR top"]
     sample = replace(dataset[0], options={"voxels": {"size": (24, 14, 24), "cell": 0.2}})
     told = "sscnet: expected voxels of 240 x 144 x 240 cells of 0.02 m; found 24 x 14 x 24 of 0.2 m"
     with pytest.raises(UserError, match=re.escape(told)):

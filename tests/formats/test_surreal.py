@@ -359,13 +359,13 @@ def test_what_a_scope_tells(people, videos, stills):
     scope = scope_of(people)
 
     def found(**changes):
-        return list(surreal.refuses(Scope(**{**vars(scope), **changes})))
+        return list(surreal.FORMAT.refuses(Scope(**{**vars(scope), **changes})))
 
     assert found() == []
     assert found(is_moving=False) == ["expected sequences (a recipe's time); found still pictures"]
     assert found(most_objects=3) == ["expected one person in a picture; found up to 3 objects"]
-    assert any("expected one sensor" in told for told in surreal.refuses(scope_of(videos)))
-    assert any("found still pictures" in told for told in surreal.refuses(scope_of(stills)))
+    assert any("expected one sensor" in told for told in surreal.FORMAT.refuses(scope_of(videos)))
+    assert any("found still pictures" in told for told in surreal.FORMAT.refuses(scope_of(stills)))
     (sensor,) = scope.rig.sensors
     odd = sensor.model_copy(update={"intrinsics": sensor.intrinsics.model_copy(update={"width": 321})})
     (told,) = found(rig=scope.rig.model_copy(update={"sensors": (odd,)}))
@@ -430,12 +430,12 @@ def test_parts_that_have_no_number_are_told_where_they_are_seen(people):
 
 
 def test_without_the_extras(monkeypatch):
-    surreal.check()
+    surreal.FORMAT.check()
     monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
     with pytest.raises(MissingExtraError, match=r"^format surreal: expected the package imageio-ffmpeg .*\[video\]'$"):
-        surreal.check()
+        surreal.FORMAT.check()
     monkeypatch.setitem(sys.modules, "scipy", None)
     with pytest.raises(
         MissingExtraError, match=r"^format surreal: expected scipy, found none: pip install 'viewsphere\[mat\]'"
     ):
-        surreal.check()
+        surreal.FORMAT.check()

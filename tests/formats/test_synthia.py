@@ -13,7 +13,7 @@ import pytest
 
 from proven import close, equal
 from viewsphere.errors import UserError
-from viewsphere.formats.synthia import COLORS, Options, Synthia, refuses
+from viewsphere.formats.synthia import COLORS, FORMAT, Synthia
 from viewsphere.model.sensors.camera import Intrinsics
 from viewsphere.model.sensors.rig import Rig, Sensor
 from viewsphere.run.exports.exporting import export
@@ -112,37 +112,37 @@ def test_sequences(videos, seqs):
 
 
 def test_two_lenses_in_a_sequence_are_an_error(videos):
-    tree = Synthia(videos, Options(layout="seqs"))
+    tree = Synthia(videos, FORMAT.options(layout="seqs"))
     with pytest.raises(UserError, match="expected one lens in each sequence; found 2 in SYNTHIA-SEQS-a"):
         tree.layout("SYNTHIA-SEQS-a/CameraParams/intrinsics.txt", {"1": 1, "2": 1})
 
 
 def test_four_sides(videos):
-    tree = Synthia(videos, Options(layout="seqs"))
+    tree = Synthia(videos, FORMAT.options(layout="seqs"))
     paths = [one.path for one in tree.sample_files(replace(videos[0], sensor="right_B"))]
     assert any("/Stereo_Right/Omni_B/000000.png" in path for path in paths)
 
 
 def test_what_it_refuses(stills, videos):
-    scope, seqs, rand = scope_of(videos), Options(layout="seqs"), Options(layout="rand")
-    assert list(refuses(scope, seqs)) == [] == list(refuses(scope, rand))
-    assert list(refuses(scope_of(stills), seqs)) == ["expected sequences (a recipe's time); found still pictures"]
+    scope, seqs, rand = scope_of(videos), FORMAT.options(layout="seqs"), FORMAT.options(layout="rand")
+    assert list(FORMAT.refuses(scope, seqs)) == [] == list(FORMAT.refuses(scope, rand))
+    assert list(FORMAT.refuses(scope_of(stills), seqs)) == ["expected sequences (a recipe's time); found still pictures"]
     named = replace(scope, categories=(Category(1, "a 'b\"", ""), Category(2, "Bäume", "")))
-    assert list(refuses(named, rand)) == ["expected names of categories without spaces; found 'a \\'b\"'"]
+    assert list(FORMAT.refuses(named, rand)) == ["expected names of categories without spaces; found 'a \\'b\"'"]
     lens = Intrinsics(width=4, height=4, fx=1, fy=1, cx=2, cy=2)
     four = tuple(Sensor(name=name, intrinsics=lens) for name in ("left_f", "right_f", "left_b"))
-    assert list(refuses(replace(scope, rig=Rig(sensors=four)), seqs)) == []
+    assert list(FORMAT.refuses(replace(scope, rig=Rig(sensors=four)), seqs)) == []
     odd = (four[0], Sensor(name="right_f", intrinsics=lens.model_copy(update={"fx": 2.0})))
-    assert list(refuses(replace(scope, rig=Rig(sensors=odd)), seqs)) == [
+    assert list(FORMAT.refuses(replace(scope, rig=Rig(sensors=odd)), seqs)) == [
         "expected cameras of one lens and one focal length; found left_f, right_f"
     ]
     other = tuple(Sensor(name=name, intrinsics=lens) for name in ("a", "b", "c"))
-    assert list(refuses(replace(scope, rig=Rig(sensors=other)), seqs)) == [
+    assert list(FORMAT.refuses(replace(scope, rig=Rig(sensors=other)), seqs)) == [
         "expected one camera, or two that are rectified; found a, b, c"
     ]
 
 
 def test_a_picture_without_objects(stills):
     sample = replace(stills[0], objects=(), channels={**stills[0].channels, "semantic": np.full((120, 160), 1, np.int32)})
-    files = {one.path: one for one in Synthia(stills, Options()).sample_files(sample)}
+    files = {one.path: one for one in Synthia(stills, FORMAT.options()).sample_files(sample)}
     assert set(files["GTTXT/0000000.txt"].content.make().split()) == {b"1"}

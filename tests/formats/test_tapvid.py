@@ -253,12 +253,12 @@ def test_a_lens_that_zooms_is_refused(videos, monkeypatch):
     with pytest.raises(
         UserError, match=f"kind tapvid3d: expected one lens all through a sequence; found that {sequence} zooms"
     ):
-        tapvid.Tapvid(dataset, tapvid.Options(kind="tapvid3d"))._archived("a", sequence, "left")
+        tapvid.Tapvid(dataset, tapvid.FORMAT.options(kind="tapvid3d"))._archived("a", sequence, "left")
 
 
 def test_what_is_refused(videos, stills, drives, tmp_path):
-    flat, deep = tapvid.Options(), tapvid.Options(kind="tapvid3d")
-    assert list(tapvid.refuses(scope_of(videos), flat)) == list(tapvid.refuses(scope_of(videos), deep)) == []
-    assert "expected sequences" in next(tapvid.refuses(scope_of(stills), flat))
+    flat, deep = tapvid.FORMAT.options(), tapvid.FORMAT.options(kind="tapvid3d")
+    assert list(tapvid.FORMAT.refuses(scope_of(videos), flat)) == list(tapvid.FORMAT.refuses(scope_of(videos), deep)) == []
+    assert "expected sequences" in next(tapvid.FORMAT.refuses(scope_of(stills), flat))
     with pytest.raises(UserError, match="LiDAR"):
         export(drives.root, "tapvid", output=tmp_path)

@@ -13,7 +13,7 @@ from PIL import Image
 from proven import close, equal
 from viewsphere import Dataset, generate
 from viewsphere.errors import UserError
-from viewsphere.formats.viper import CLASSES, Viper, refuses
+from viewsphere.formats.viper import CLASSES, FORMAT, Viper
 from viewsphere.run.exports.exporting import export
 from viewsphere.run.exports.scope import scope_of
 from viewsphere.store import Category
@@ -133,8 +133,8 @@ def test_a_picture_without_objects(lone):
 
 def test_what_it_refuses(stills, videos, lone):
     assert len(CLASSES.splitlines()) == 32
-    assert list(refuses(scope_of(lone))) == []
-    assert list(refuses(scope_of(stills))) == ["expected sequences (a recipe's time); found still pictures"]
-    assert list(refuses(scope_of(videos))) == []
+    assert list(FORMAT.refuses(scope_of(lone))) == []
+    assert list(FORMAT.refuses(scope_of(stills))) == ["expected sequences (a recipe's time); found still pictures"]
+    assert list(FORMAT.refuses(scope_of(videos))) == []
     many = replace(scope_of(lone), categories=tuple(Category(i, str(i), "") for i in range(300)))
-    assert list(refuses(many)) == ["expected at most 200 categories; found 300"]
+    assert list(FORMAT.refuses(many)) == ["expected at most 200 categories; found 300"]

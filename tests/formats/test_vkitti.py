@@ -9,7 +9,7 @@ import pytest
 from PIL import Image
 
 from proven import close, equal
-from viewsphere.formats.vkitti import Options, refuses
+from viewsphere.formats.vkitti import FORMAT
 from viewsphere.formats.vkitti.names import COLORS, Names, object_colors
 from viewsphere.model.sensors.camera import Intrinsics
 from viewsphere.model.sensors.rig import Rig
@@ -248,13 +248,15 @@ def test_what_it_refuses(stills, videos):
 
     from viewsphere.store import Category
 
-    scope, new, old = scope_of(videos), Options(), Options(version="1.3.1")
-    assert list(refuses(scope, new)) == []
-    assert list(refuses(scope, old)) == ["expected one sensor; found left, right"]
-    assert list(refuses(scope_of(stills), new)) == ["expected sequences (a recipe's time); found still pictures"]
+    scope, new, old = scope_of(videos), FORMAT.options(), FORMAT.options(version="1.3.1")
+    assert list(FORMAT.refuses(scope, new)) == []
+    assert list(FORMAT.refuses(scope, old)) == ["expected one sensor; found left, right"]
+    assert list(FORMAT.refuses(scope_of(stills), new)) == ["expected sequences (a recipe's time); found still pictures"]
     odd = replace(scope, categories=(Category(1, "tall tree", ""), Category(2, "car:é", ""), Category(3, "Bäume'\"", "")))
-    assert [problem[-12:] for problem in refuses(odd, new)] == ["'tall tree'"[-12:].rjust(12), " found 'car:é'"[-12:]]
+    assert [problem[-12:] for problem in FORMAT.refuses(odd, new)] == ["'tall tree'"[-12:].rjust(12), " found 'car:é'"[-12:]]
     many = replace(scope, most_objects=256)
-    assert list(refuses(many, new)) == ["expected at most 255 objects in a picture; found 256"]
+    assert list(FORMAT.refuses(many, new)) == ["expected at most 255 objects in a picture; found 256"]
     lens = Intrinsics(width=4, height=4, fx=1, fy=1, cx=2, cy=2, skew=0.5)
-    assert list(refuses(replace(scope, rig=Rig.single(lens)), new)) == ["expected cameras without skew; found 0.5 of camera"]
+    assert list(FORMAT.refuses(replace(scope, rig=Rig.single(lens)), new)) == [
+        "expected cameras without skew; found 0.5 of camera"
+    ]

@@ -9,7 +9,7 @@ import pytest
 
 from cube_dataset import make
 from viewsphere import Dataset
-from viewsphere.formats.webdataset import Options, verify
+from viewsphere.formats.webdataset import FORMAT
 from viewsphere.model.fields.files import Files
 from viewsphere.run.exports.exporting import export
 from viewsphere.store.shots.sample_records import from_whole_sample
@@ -108,8 +108,8 @@ def test_the_stores_files_are_smaller(tmp_path):
     for name in ("rgb.webp", "depth.png", "normals.tiff", "instances.png"):
         assert first[name] == dataset.path(dataset[0].files[name.split(".")[0]]).read_bytes()
     assert sum(f.stat().st_size for f in stored.iterdir()) < 0.7 * sum(f.stat().st_size for f in plain.iterdir())
-    assert list(verify(dataset, stored, (), Options(arrays="files"))) == []
-    assert list(verify(dataset, stored, (), Options()))
+    assert list(FORMAT.verify(dataset, stored, (), FORMAT.options(arrays="files"))) == []
+    assert list(FORMAT.verify(dataset, stored, (), FORMAT.options()))
 
 
 def test_its_proof_names_the_frame_and_the_file(dataset, tmp_path):
@@ -121,6 +121,6 @@ def test_its_proof_names_the_frame_and_the_file(dataset, tmp_path):
     data[last.offset_data + 200] ^= 1
     shard.unlink()
     shard.write_bytes(data)
-    ((frame, line),) = verify(dataset, folder, (), Options())
+    ((frame, line),) = FORMAT.verify(dataset, folder, (), FORMAT.options())
     assert frame == int(last.name[:8])
     assert line.startswith(f"train-000000.tar: {last.name}: expected the bytes that are exported")

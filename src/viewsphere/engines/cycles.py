@@ -14,13 +14,13 @@ if TYPE_CHECKING:
     from pydantic import JsonValue
 
 
-def check(options: Mapping[str, JsonValue]) -> None:
+def _check(options: Mapping[str, JsonValue]) -> None:
     """Raise UserError for an unknown option (with the nearest name), a value out of range, or a missing Blender."""
     _blender.check(options, "cycles")
 
 
 ENGINE = EngineSpec(
-    check=check,
+    check=_check,
     stage=stage,
     paints=tuple(PASSES),
     opens_scenes=True,

@@ -73,7 +73,7 @@ BODY = np.array([[0.0, 1, 0], [0, 0, 1], [1, 0, 0]])
 """The rotation from a body's axes (ahead, right, down) to a camera's (right, down, ahead)."""
 
 
-class Options(Frozen):
+class _Options(Frozen):
     """The image types to record."""
 
     images: tuple[Kind, ...] = Field(
@@ -83,16 +83,16 @@ class Options(Frozen):
     )
 
 
-def needs(options: Options) -> tuple[str, ...]:
+def _needs(options: _Options) -> tuple[str, ...]:
     """Return the channels that the images need."""
     return tuple(dict.fromkeys(KINDS[kind][2] for kind in options.images if kind != "scene"))
 
 
-def refuses(scope: Scope, options: Options) -> Iterator[str]:
+def _refuses(scope: Scope, options: _Options) -> Iterator[str]:
     """Reasons to refuse: unknown labels or cameras, lenses that need more than an angle of view, and more objects than
     colours.
     """
-    yield from refusals.lacking_labels(scope, needs(options))
+    yield from refusals.lacking_labels(scope, _needs(options))
     yield from refusals.known_cameras(scope)
     yield from refusals.pinhole(scope)
     yield from refusals.centred(scope)
@@ -105,7 +105,7 @@ def refuses(scope: Scope, options: Options) -> Iterator[str]:
 class AirSim(Tree):
     """The recordings of a data set."""
 
-    def __init__(self, dataset: Dataset, options: Options) -> None:
+    def __init__(self, dataset: Dataset, options: _Options) -> None:
         super().__init__(dataset)
         self._kinds = tuple(dict.fromkeys(options.images))
 
@@ -185,11 +185,11 @@ FORMAT = FormatSpec(
     about=__doc__,
     holds=("cameras", "depth", "disparity", "instances"),
     read_by=("pandas", "AirSim's read_pfm"),
-    options=Options,
+    options=_Options,
     channels=("rgb",),
     names_credits=False,
-    needs=needs,
-    refuses=refuses,
+    needs=_needs,
+    refuses=_refuses,
     writer=writer,
     preparer=preparer,
     verify=verify,

@@ -84,7 +84,7 @@ STUFF = {
 }
 
 
-def refuses(scope: Scope) -> Iterator[str]:
+def _refuses(scope: Scope) -> Iterator[str]:
     """Reasons to refuse: unknown cameras, lenses that need more than an angle of view, and more objects than ids."""
     yield from refusals.known_cameras(scope)
     yield from refusals.pinhole(scope)
@@ -182,7 +182,7 @@ FORMAT = FormatSpec(
     read_by=("OpenCV", "code for CARLA's sensors"),
     channels=("rgb", "depth", "semantic", "instances"),
     names_credits=False,
-    refuses=refuses,
+    refuses=_refuses,
     writer=writer,
     preparer=preparer,
     verify=verify,

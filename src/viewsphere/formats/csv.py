@@ -57,13 +57,13 @@ FORMULA = ("=", "+", "-", "@", "\t", "\r")
 HEAD = (*OF_SAMPLE, *OF_OBJECT, *OF_VIEW, *(f"{name}_{part}" for name, parts in LISTS.items() for part in parts))
 
 
-class Options(Frozen):
+class _Options(Frozen):
     """Options of texts in the table."""
 
     safe: bool = Field(default=True, description="`true`: a ' in front of texts that spreadsheets would run as formulas")
 
 
-def _preparer(dataset: Dataset, folder: Path, options: Options) -> Callable[[Sample], list[list[Any]]]:
+def _preparer(dataset: Dataset, folder: Path, options: _Options) -> Callable[[Sample], list[list[Any]]]:
     """Puts a sample's picture in place, and makes its rows."""
 
     def prepare(sample: Sample) -> list[list[Any]]:
@@ -76,14 +76,14 @@ def _preparer(dataset: Dataset, folder: Path, options: Options) -> Callable[[Sam
 
 @contextmanager
 def _writer(
-    dataset: Dataset, folder: Path, note: Callable[[str], None], options: Options
+    dataset: Dataset, folder: Path, note: Callable[[str], None], options: _Options
 ) -> Generator[Callable[[list[list[Any]]], None]]:
     """Write the table."""
     with _table(folder / TABLE) as append:
         yield append
 
 
-def verify(dataset: Dataset, folder: Path, sampled: Collection[int], options: Options) -> Iterator[Remark]:
+def _verify(dataset: Dataset, folder: Path, sampled: Collection[int], options: _Options) -> Iterator[Remark]:
     """Yield every difference from the current export."""
     with temporary("csv") as scratch_folder:
         with _table(scratch_folder / TABLE) as append:
@@ -93,7 +93,7 @@ def verify(dataset: Dataset, folder: Path, sampled: Collection[int], options: Op
             yield from _rows_that_differ(scratch_folder / TABLE, folder / TABLE)
 
 
-def _expected(dataset: Dataset, options: Options, append: Callable[[list[list[Any]]], None]) -> Iterator[Expected]:
+def _expected(dataset: Dataset, options: _Options, append: Callable[[list[list[Any]]], None]) -> Iterator[Expected]:
     for sample in dataset:
         append(list(_rows(sample, options)))
         yield from _picture(sample)
@@ -120,7 +120,7 @@ def _table(file: Path) -> Generator[Callable[[list[list[Any]]], None]]:
         yield rows.writerows
 
 
-def _rows(sample: Sample, options: Options) -> Iterator[list[Any]]:
+def _rows(sample: Sample, options: _Options) -> Iterator[list[Any]]:
     cell = _safe if options.safe else _cell
     own = [cell(value) for value in (_name(sample), *(getattr(sample, name) for name in OF_SAMPLE[1:]))]
     for o in sample.objects:
@@ -164,10 +164,10 @@ FORMAT = FormatSpec(
     about=__doc__,
     holds=("boxes", "poses", "views", "sizes"),
     read_by=("pandas", "any spreadsheet"),
-    options=Options,
+    options=_Options,
     channels=(),  # pictures are used if there are any
     names_credits=False,
     writer=_writer,
     preparer=_preparer,
-    verify=verify,
+    verify=_verify,
 )

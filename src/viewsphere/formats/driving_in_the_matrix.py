@@ -41,13 +41,13 @@ TRUNCATED = 0.15
 NAMES = r"[^\x00-\x1f]+"
 
 
-class Options(Frozen):
+class _Options(Frozen):
     """The size below which objects are too small."""
 
     smallest: int = Field(default=0, ge=0, le=10**9, description="objects that show fewer pixels are `difficult`, and not read")
 
 
-def refuses(scope: Scope, options: Options) -> Iterator[str]:
+def _refuses(scope: Scope, options: _Options) -> Iterator[str]:
     """Reasons to refuse: names that XML cannot hold."""
     yield from plain_names(scope, NAMES, "of one line, that XML can hold")
 
@@ -55,7 +55,7 @@ def refuses(scope: Scope, options: Options) -> Iterator[str]:
 class Matrix(Tree):
     """The tree of a data set."""
 
-    def __init__(self, dataset: Dataset, options: Options) -> None:
+    def __init__(self, dataset: Dataset, options: _Options) -> None:
         super().__init__(dataset)
         self._smallest = options.smallest
 
@@ -113,10 +113,10 @@ FORMAT = FormatSpec(
     about=__doc__,
     holds=("boxes", "truncation"),
     read_by=("supervision", "its own training code"),
-    options=Options,
+    options=_Options,
     channels=("rgb",),
     names_credits=False,
-    refuses=refuses,
+    refuses=_refuses,
     writer=writer,
     preparer=preparer,
     verify=verify,

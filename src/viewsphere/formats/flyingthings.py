@@ -62,7 +62,7 @@ WAYS = (("future", "flow"), ("past", "flow_backward"))
 OPENGL = (1.0, -1.0, -1.0, 1.0)
 
 
-class Options(Frozen):
+class _Options(Frozen):
     """The choice among the three sets whose folders the export can write."""
 
     set: Literal["flyingthings3d", "monkaa", "driving"] = Field(
@@ -70,7 +70,7 @@ class Options(Frozen):
     )
 
 
-def refuses(scope: Scope, options: Options) -> Iterator[str]:
+def _refuses(scope: Scope, options: _Options) -> Iterator[str]:
     """Reasons to refuse: still pictures, and rigs other than a stereo pair."""
     yield from refusals.sequences(scope)
     yield from refusals.stereo(scope)
@@ -80,7 +80,7 @@ def refuses(scope: Scope, options: Options) -> Iterator[str]:
 class FlyingThings(Tree):
     """The tree of a set."""
 
-    def __init__(self, dataset: Dataset, options: Options) -> None:
+    def __init__(self, dataset: Dataset, options: _Options) -> None:
         super().__init__(dataset)
         check_whole(dataset, "flyingthings")
         self._set, self._eyes = options.set, Eyes(dataset)
@@ -143,10 +143,10 @@ FORMAT = FormatSpec(
     about=__doc__,
     holds=("flow", "disparity", "disparity change", "instances", "motion boundaries", "occlusions", "cameras"),
     read_by=("torchvision", "ptlflow"),
-    options=Options,
+    options=_Options,
     channels=("rgb", "instances", "flow", "flow_backward", "disparity"),
     names_credits=False,
-    refuses=refuses,
+    refuses=_refuses,
     writer=writer,
     preparer=preparer,
     verify=verify,

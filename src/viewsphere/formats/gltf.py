@@ -67,7 +67,7 @@ def _writer(dataset: Dataset, folder: Path, note: Callable[[str], None]) -> Gene
             (folder / name).write_bytes(content)
 
 
-def verify(dataset: Dataset, folder: Path, sampled: Collection[int]) -> Iterator[Remark]:
+def _verify(dataset: Dataset, folder: Path, sampled: Collection[int]) -> Iterator[Remark]:
     """Yield scenes and rows that differ from the current export."""
     with temporary("cameras") as scratch_folder:
         scenes = _Scenes(dataset, scratch_folder)
@@ -180,5 +180,5 @@ FORMAT = FormatSpec(
     names_credits=False,
     refuses=_refuses,
     writer=_writer,
-    verify=verify,
+    verify=_verify,
 )

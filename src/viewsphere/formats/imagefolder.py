@@ -44,7 +44,7 @@ LONGEST = 255
 """Largest number of bytes in a folder's name."""
 
 
-class Options(Frozen):
+class _Options(Frozen):
     """The meaning of a class."""
 
     by: Literal["category", "pose_category"] = Field(
@@ -52,7 +52,7 @@ class Options(Frozen):
     )
 
 
-def refuses(scope: Scope, options: Options) -> Iterator[str]:
+def _refuses(scope: Scope, options: _Options) -> Iterator[str]:
     """Reasons to refuse: categories whose folders would coincide, and splits that `datasets` cannot distinguish."""
     names = [_folder(category.name) for category in scope.categories] if options.by == "category" else []
     for name in names:
@@ -66,7 +66,7 @@ def refuses(scope: Scope, options: Options) -> Iterator[str]:
 class ImageFolder(Tree):
     """The tree of these classes."""
 
-    def __init__(self, dataset: Dataset, options: Options) -> None:
+    def __init__(self, dataset: Dataset, options: _Options) -> None:
         super().__init__(dataset)
         self._by = options.by
 
@@ -126,10 +126,10 @@ FORMAT = FormatSpec(
     about=__doc__,
     holds=("the class of a picture", "viewpoints"),
     read_by=("torchvision", "datasets"),
-    options=Options,
+    options=_Options,
     channels=("rgb",),
     names_credits=False,
-    refuses=refuses,
+    refuses=_refuses,
     writer=writer,
     preparer=preparer,
     verify=verify,

@@ -36,7 +36,7 @@ from viewsphere.store import Dataset
 CAMERAS = {"left": "image_02", "right": "image_03"}
 
 
-def refuses(scope: Scope) -> Iterator[str]:
+def _refuses(scope: Scope) -> Iterator[str]:
     """Reasons to refuse: still pictures, rigs of several cameras other than a pair, and distorted lenses."""
     yield from refusals.sequences(scope)
     yield from two_eyes(scope)
@@ -77,7 +77,7 @@ FORMAT = FormatSpec(
     read_by=("OpenCV", "Pillow"),
     channels=("rgb", "depth"),
     names_credits=False,
-    refuses=refuses,
+    refuses=_refuses,
     writer=writer,
     preparer=preparer,
     verify=verify,

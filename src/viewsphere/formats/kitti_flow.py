@@ -55,7 +55,7 @@ from viewsphere.store import Dataset
 MATCHED = {"noc": (0, 1), "occ": (0, 1, 2)}  # states of points: with a match inside the other picture, or anywhere
 
 
-class Options(Frozen):
+class _Options(Frozen):
     """The benchmark."""
 
     set: Literal["scene_flow_2015", "stereo_flow_2012"] = Field(
@@ -63,12 +63,12 @@ class Options(Frozen):
     )
 
 
-def _needs(options: Options) -> tuple[str, ...]:
+def _needs(options: _Options) -> tuple[str, ...]:
     """Labels of scene flow."""
     return ("disparity_change", "instances") if options.set == "scene_flow_2015" else ()
 
 
-def refuses(scope: Scope, options: Options) -> Iterator[str]:
+def _refuses(scope: Scope, options: _Options) -> Iterator[str]:
     """Reasons to refuse: still pictures, rigs other than a stereo pair, and more objects than 8 bits can number."""
     yield from refusals.sequences(scope)
     yield from refusals.stereo(scope)
@@ -80,7 +80,7 @@ def refuses(scope: Scope, options: Options) -> Iterator[str]:
 class KittiFlow(Tree):
     """The tree of a benchmark."""
 
-    def __init__(self, dataset: Dataset, options: Options) -> None:
+    def __init__(self, dataset: Dataset, options: _Options) -> None:
         super().__init__(dataset)
         check_whole(dataset, "kitti_flow")
         self._eyes, self._has_motion = Eyes(dataset), options.set == "scene_flow_2015"
@@ -153,11 +153,11 @@ FORMAT = FormatSpec(
     about=__doc__,
     holds=("flow", "disparity", "scene flow", "instances", "calibration"),
     read_by=("torchvision", "ptlflow"),
-    options=Options,
+    options=_Options,
     channels=("rgb", "flow", "flow_state", "disparity", "disparity_state"),
     names_credits=False,
     needs=_needs,
-    refuses=refuses,
+    refuses=_refuses,
     writer=writer,
     preparer=preparer,
     verify=verify,

@@ -52,7 +52,7 @@ from viewsphere.plugins.format import FormatSpec
 from viewsphere.store import Dataset
 
 
-class Options(Frozen):
+class _Options(Frozen):
     """The benchmark whose folders the export writes."""
 
     set: Literal["middlebury", "eth3d"] = Field(
@@ -60,7 +60,7 @@ class Options(Frozen):
     )
 
 
-def refuses(scope: Scope, options: Options) -> Iterator[str]:
+def _refuses(scope: Scope, options: _Options) -> Iterator[str]:
     """Yield the reasons why a data set has no stereo pairs."""
     yield from refusals.stereo(scope)
     yield from two_eyes(scope)
@@ -69,7 +69,7 @@ def refuses(scope: Scope, options: Options) -> Iterator[str]:
 class Middlebury(Tree):
     """The tree of scenes."""
 
-    def __init__(self, dataset: Dataset, options: Options) -> None:
+    def __init__(self, dataset: Dataset, options: _Options) -> None:
         super().__init__(dataset)
         self._eyes, self._is_eth3d = Eyes(dataset), options.set == "eth3d"
 
@@ -129,10 +129,10 @@ FORMAT = FormatSpec(
     about=__doc__,
     holds=("disparity", "occlusions", "calibration"),
     read_by=("torchvision",),
-    options=Options,
+    options=_Options,
     channels=("rgb", "disparity", "disparity_state"),
     names_credits=False,
-    refuses=refuses,
+    refuses=_refuses,
     writer=writer,
     preparer=preparer,
     verify=verify,

@@ -39,7 +39,7 @@ from viewsphere.store import Dataset
 KINDS = (".png", ".jpg")
 
 
-class Options(Frozen):
+class _Options(Frozen):
     """The extent of boxes."""
 
     boxes: Literal["visible", "whole"] = Field(
@@ -49,7 +49,7 @@ class Options(Frozen):
     )
 
 
-def refuses(scope: Scope, options: Options) -> Iterator[str]:
+def _refuses(scope: Scope, options: _Options) -> Iterator[str]:
     """Yield the refused samples: still pictures, and names longer than a line."""
     yield from sequences(scope)
     yield from plain_names(scope, r"\S([^\r\n]*\S)?", "of one line, without spaces at its ends")
@@ -58,7 +58,7 @@ def refuses(scope: Scope, options: Options) -> Iterator[str]:
 class _Mot(Tree):
     """The tree of these boxes."""
 
-    def __init__(self, dataset: Dataset, options: Options) -> None:
+    def __init__(self, dataset: Dataset, options: _Options) -> None:
         super().__init__(dataset)
         self._field = {"visible": "box2d", "whole": "box2d_projected"}[options.boxes]
         self._labels = "".join(f"{category.name}\n" for category in dataset.categories)
@@ -111,10 +111,10 @@ FORMAT = FormatSpec(
     about=__doc__,
     holds=("boxes", "tracks of objects", "visibility"),
     read_by=("motmetrics", "TrackEval", "datumaro"),
-    options=Options,
+    options=_Options,
     channels=("rgb",),
     names_credits=False,
-    refuses=refuses,
+    refuses=_refuses,
     writer=writer,
     preparer=preparer,
     verify=verify,

@@ -57,7 +57,7 @@ Y_UP = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
 """The rotation from the axes of objects (x left, y back, z up) to NOCS' axes (x left, y up, z to the front)."""
 
 
-def refuses(scope: Scope) -> Iterator[str]:
+def _refuses(scope: Scope) -> Iterator[str]:
     """Reasons to refuse: unknown cameras, and more objects than the mask can number."""
     yield from known_cameras(scope)
     yield from most_objects(scope, BACKGROUND - 1)
@@ -171,7 +171,7 @@ FORMAT = FormatSpec(
     read_by=("NOCS_CVPR2019", "category-level pose estimators"),
     channels=("rgb", "depth", "instances", "nocs"),
     names_credits=False,
-    refuses=refuses,
+    refuses=_refuses,
     writer=writer,
     preparer=preparer,
     verify=verify,

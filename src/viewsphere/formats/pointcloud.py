@@ -36,7 +36,7 @@ AXES = {
 }
 
 
-class Options(Frozen):
+class _Options(Frozen):
     """The choice of points, and their axes."""
 
     axes: Literal["camera", "world"] = Field(
@@ -49,17 +49,17 @@ class Options(Frozen):
     )
 
 
-def _needs(options: Options) -> tuple[str, ...]:
+def _needs(options: _Options) -> tuple[str, ...]:
     """The channels that these options require."""
     return ("surface_samples",) if options.surface == "complete" else ()
 
 
-def _refuses(scope: Scope, options: Options) -> Iterator[str]:
+def _refuses(scope: Scope, options: _Options) -> Iterator[str]:
     """Yield an error if no picture has a known camera."""
     yield from any_camera(scope)
 
 
-def _preparer(dataset: Dataset, folder: Path, options: Options) -> Callable[[Sample], None]:
+def _preparer(dataset: Dataset, folder: Path, options: _Options) -> Callable[[Sample], None]:
     """Write a sample's cloud."""
 
     def prepare(sample: Sample) -> None:
@@ -72,7 +72,9 @@ def _preparer(dataset: Dataset, folder: Path, options: Options) -> Callable[[Sam
 
 
 @contextmanager
-def _writer(dataset: Dataset, folder: Path, note: Callable[[str], None], options: Options) -> Generator[Callable[[None], None]]:
+def _writer(
+    dataset: Dataset, folder: Path, note: Callable[[str], None], options: _Options
+) -> Generator[Callable[[None], None]]:
     """A writer that adds nothing: the clouds are the whole export."""
     for name in missing(_needs(options), dataset.plan.channels):
         raise UserError(
@@ -81,7 +83,7 @@ def _writer(dataset: Dataset, folder: Path, note: Callable[[str], None], options
     yield lambda done: None
 
 
-def verify(dataset: Dataset, folder: Path, sampled: Collection[int], options: Options) -> Iterator[Remark]:
+def _verify(dataset: Dataset, folder: Path, sampled: Collection[int], options: _Options) -> Iterator[Remark]:
     """Yield clouds that differ from the current export."""
     names = [_name(dataset, sample) for sample in dataset if sample.known_camera is not None]
     yield from check_files(dataset, folder, (), (), names)
@@ -97,7 +99,7 @@ def _name(dataset: Dataset, sample: Sample) -> str:
     return "/".join(parts)
 
 
-def _content(sample: Sample, options: Options) -> bytes:
+def _content(sample: Sample, options: _Options) -> bytes:
     cloud = sample.point_cloud(options.axes, options.surface)
     columns = dict(zip("xyz", cloud.points.astype(np.float32).T, strict=True))
     if cloud.colors is not None:
@@ -118,12 +120,12 @@ FORMAT = FormatSpec(
     about=__doc__,
     holds=("coloured points", "normals", "objects"),
     read_by=("Open3D", "trimesh", "MeshLab", "CloudCompare"),
-    options=Options,
+    options=_Options,
     channels=("depth", "instances"),
     names_credits=False,
     needs=_needs,
     refuses=_refuses,
     writer=_writer,
     preparer=_preparer,
-    verify=verify,
+    verify=_verify,
 )

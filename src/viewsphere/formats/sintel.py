@@ -57,18 +57,18 @@ MOST = 1024
 """Disparities, in pixels, that Sintel's encoding holds: 4 pixels a step of red, and fractions in green and blue."""
 
 
-class Options(Frozen):
+class _Options(Frozen):
     """The choice of Sintel's archives."""
 
     stereo: bool = Field(default=False, description="the archive of stereo pairs, too; of a rig of two rectified cameras")
 
 
-def _needs(options: Options) -> tuple[str, ...]:
+def _needs(options: _Options) -> tuple[str, ...]:
     """Labels of pairs."""
     return ("disparity", "disparity_state") if options.stereo else ()
 
 
-def refuses(scope: Scope, options: Options) -> Iterator[str]:
+def _refuses(scope: Scope, options: _Options) -> Iterator[str]:
     """Yield the refused samples: still pictures, rigs that are no pair, and distorted lenses."""
     yield from refusals.sequences(scope)
     yield from refusals.stereo(scope) if options.stereo else two_eyes(scope)
@@ -78,7 +78,7 @@ def refuses(scope: Scope, options: Options) -> Iterator[str]:
 class Sintel(Tree):
     """The tree of a data set."""
 
-    def __init__(self, dataset: Dataset, options: Options) -> None:
+    def __init__(self, dataset: Dataset, options: _Options) -> None:
         super().__init__(dataset)
         check_whole(dataset, "sintel")
         self._stereo, self._eyes = options.stereo, Eyes(dataset)
@@ -146,11 +146,11 @@ FORMAT = FormatSpec(
     about=__doc__,
     holds=("flow", "occlusions", "depth", "cameras", "instances", "disparity"),
     read_by=("torchvision", "ptlflow"),
-    options=Options,
+    options=_Options,
     channels=("rgb", "depth", "instances", "flow", "flow_state"),
     names_credits=False,
     needs=_needs,
-    refuses=refuses,
+    refuses=_refuses,
     writer=writer,
     preparer=preparer,
     verify=verify,

@@ -88,7 +88,7 @@ STUFF = {
 }
 
 
-def refuses(scope: Scope) -> Iterator[str]:
+def _refuses(scope: Scope) -> Iterator[str]:
     """Reasons to refuse: distorted lenses, and LiDARs, which have no picture."""
     yield from refusals.known_cameras(scope)
     yield from refusals.pinhole(scope)
@@ -161,7 +161,7 @@ FORMAT = FormatSpec(
     read_by=("code for SSCNet's data",),
     channels=("depth", "voxels"),
     names_credits=False,
-    refuses=refuses,
+    refuses=_refuses,
     writer=writer,
     preparer=preparer,
     verify=verify,

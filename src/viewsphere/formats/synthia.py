@@ -115,7 +115,7 @@ SWAPPED = np.array([[1.0, 0, 0], [0, 0, 1], [0, 1, 0]])
 UPWARD = np.diag([1.0, -1, 1])
 
 
-class Options(Frozen):
+class _Options(Frozen):
     """The choice of SYNTHIA's trees."""
 
     layout: Literal["seqs", "rand"] = Field(
@@ -123,12 +123,12 @@ class Options(Frozen):
     )
 
 
-def _needs(options: Options) -> tuple[str, ...]:
+def _needs(options: _Options) -> tuple[str, ...]:
     """Return the additional channels of sequences."""
     return ("depth", "instances") if options.layout == "seqs" else ()
 
 
-def refuses(scope: Scope, options: Options) -> Iterator[str]:
+def _refuses(scope: Scope, options: _Options) -> Iterator[str]:
     """Reasons to refuse: for sequences, still pictures and unsupported rigs and lenses; always, names with spaces and more
     categories than numbers.
     """
@@ -150,7 +150,7 @@ def refuses(scope: Scope, options: Options) -> Iterator[str]:
 class Synthia(Tree):
     """The tree of a layout."""
 
-    def __init__(self, dataset: Dataset, options: Options) -> None:
+    def __init__(self, dataset: Dataset, options: _Options) -> None:
         super().__init__(dataset)
         self._rand = options.layout == "rand"
         light = LIGHTS[options.layout]
@@ -248,11 +248,11 @@ FORMAT = FormatSpec(
     about=__doc__,
     holds=("segmentation", "instances", "depth", "cameras", "stereo"),
     read_by=("datumaro (rand)", "OpenCV", "numpy"),
-    options=Options,
+    options=_Options,
     channels=("rgb", "semantic"),
     names_credits=False,
     needs=_needs,
-    refuses=refuses,
+    refuses=_refuses,
     writer=writer,
     preparer=preparer,
     verify=verify,

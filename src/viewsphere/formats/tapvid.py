@@ -56,7 +56,7 @@ UNIX = 3
 """The system that all archives name as their origin."""
 
 
-class Options(Frozen):
+class _Options(Frozen):
     """The benchmark."""
 
     kind: Literal["tapvid", "tapvid3d"] = Field(
@@ -64,7 +64,7 @@ class Options(Frozen):
     )
 
 
-def refuses(scope: Scope, options: Options) -> Iterator[str]:
+def _refuses(scope: Scope, options: _Options) -> Iterator[str]:
     """Reasons to refuse: still pictures and, for TAPVid-3D, distorted lenses."""
     yield from refusals.sequences(scope)
     if options.kind == "tapvid3d":
@@ -74,7 +74,7 @@ def refuses(scope: Scope, options: Options) -> Iterator[str]:
 class Tapvid(Tree):
     """A tree with a file for each video."""
 
-    def __init__(self, dataset: Dataset, options: Options) -> None:
+    def __init__(self, dataset: Dataset, options: _Options) -> None:
         super().__init__(dataset)
         check_whole(dataset, "tapvid")
         self._make, self._ending = {"tapvid": (self._pickled, "pkl"), "tapvid3d": (self._archived, "npz")}[options.kind]
@@ -138,10 +138,10 @@ FORMAT = FormatSpec(
     about=__doc__,
     holds=("point tracks", "occlusion", "cameras"),
     read_by=("tapnet",),
-    options=Options,
+    options=_Options,
     channels=("rgb", "tracks"),
     names_credits=False,
-    refuses=refuses,
+    refuses=_refuses,
     writer=writer,
     preparer=preparer,
     verify=verify,

@@ -107,7 +107,7 @@ STUFF = {
 UPWARD = np.diag([1.0, -1, -1])
 
 
-def refuses(scope: Scope) -> Iterator[str]:
+def _refuses(scope: Scope) -> Iterator[str]:
     """Reasons to refuse: still pictures, lenses that need more than an angle of view, and more objects or categories than
     numbers.
     """
@@ -197,7 +197,7 @@ FORMAT = FormatSpec(
     read_by=("ptlflow",),
     channels=("rgb", "semantic", "instances", "flow"),
     names_credits=False,
-    refuses=refuses,
+    refuses=_refuses,
     writer=writer,
     preparer=preparer,
     verify=verify,

@@ -32,7 +32,7 @@ from viewsphere.store import Dataset
 from viewsphere.store.shots.sample_records import whole_sample
 
 
-class Options(Frozen):
+class _Options(Frozen):
     """The size of shards, and the encoding of numbers."""
 
     samples_per_shard: int = Field(default=1000, ge=1, description="most samples of a shard")
@@ -61,7 +61,7 @@ class _Piece:
 
 @contextmanager
 def _writer(
-    dataset: Dataset, folder: Path, note: Callable[[str], None], options: Options
+    dataset: Dataset, folder: Path, note: Callable[[str], None], options: _Options
 ) -> Generator[Callable[[Sample], None]]:
     """Write the shards and their indices; no more than a sample is held in memory."""
     shards = _Shards(dataset, options)
@@ -75,7 +75,7 @@ def _writer(
     put(shards.end())
 
 
-def verify(dataset: Dataset, folder: Path, sampled: Collection[int], options: Options) -> Iterator[Remark]:
+def _verify(dataset: Dataset, folder: Path, sampled: Collection[int], options: _Options) -> Iterator[Remark]:
     """Yield every difference from the current export in bytes, by the files inside the shards."""
     shards, sizes = _Shards(dataset, options), dict[str, int]()
     for piece in shards.all():
@@ -130,7 +130,7 @@ class _Split:
 class _Shards:
     """The conversion of samples into the bytes of the export's files."""
 
-    def __init__(self, dataset: Dataset, options: Options) -> None:
+    def __init__(self, dataset: Dataset, options: _Options) -> None:
         self._dataset, self._options = dataset, options
         self._splits: dict[str, _Split] = {}
 
@@ -184,8 +184,8 @@ FORMAT = FormatSpec(
     about=__doc__,
     holds=("everything",),
     read_by=("webdataset", "wids"),
-    options=Options,
+    options=_Options,
     names_credits=False,
     writer=_writer,
-    verify=verify,
+    verify=_verify,
 )

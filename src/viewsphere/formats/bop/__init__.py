@@ -77,7 +77,7 @@ from viewsphere.plugins.format import FormatSpec
 from viewsphere.store import Dataset
 
 
-class Options(Frozen):
+class _Options(Frozen):
     """The layout of files, and the resolution of depth."""
 
     layout: Literal["scenewise", "imagewise", "webdataset"] = Field(
@@ -98,12 +98,12 @@ SCENE = 1000
 """Numbers of still pictures in a scene, and of pictures in a shard."""
 
 
-def _needs(options: Options) -> tuple[str, ...]:
+def _needs(options: _Options) -> tuple[str, ...]:
     """The required labels: whole masks, which all layouts contain."""
     return ("amodal",)
 
 
-def _refuses(scope: Scope, options: Options) -> Iterator[str]:
+def _refuses(scope: Scope, options: _Options) -> Iterator[str]:
     """Reasons to refuse: unknown cameras, lenses that K does not describe, and objects without whole masks."""
     yield from lacking_labels(scope, _needs(options))
     yield from known_cameras(scope)
@@ -113,7 +113,7 @@ def _refuses(scope: Scope, options: Options) -> Iterator[str]:
 class Bop(Tree):
     """The tree of a layout."""
 
-    def __init__(self, dataset: Dataset, options: Options) -> None:
+    def __init__(self, dataset: Dataset, options: _Options) -> None:
         super().__init__(dataset)
         self._options = options
         self._numbers = {key: number for number, key in enumerate(dataset.plan.models, 1)}
@@ -224,7 +224,7 @@ FORMAT = FormatSpec(
     about=__doc__,
     holds=("object poses", "visible and whole masks", "depth", "camera poses", "models", "symmetries"),
     read_by=("bop_toolkit", "BlenderProc", "webdataset"),
-    options=Options,
+    options=_Options,
     channels=("rgb", "depth"),
     names_credits=False,
     needs=_needs,

@@ -62,7 +62,7 @@ def _preparer(dataset: Dataset, folder: Path, options: Options) -> Callable[[Sam
     return preparer(dataset, folder, options)
 
 
-def verify(dataset: Dataset, folder: Path, sampled: Collection[int], options: Options) -> Iterator[Remark]:
+def _verify(dataset: Dataset, folder: Path, sampled: Collection[int], options: Options) -> Iterator[Remark]:
     """Every fault of an export."""
     from viewsphere.formats.coco.cross_check import verify
 
@@ -85,6 +85,6 @@ FORMAT = FormatSpec(
     notes=notes,
     writer=_writer,
     preparer=_preparer,
-    verify=verify,
+    verify=_verify,
     read=_read,
 )

@@ -67,7 +67,7 @@ SINGLE = 255
 """The class number of all objects in pictures of a single object."""
 
 
-class Options(Frozen):
+class _Options(Frozen):
     """The choice of two namings."""
 
     naming: Literal["fat", "ndds"] = Field(
@@ -75,7 +75,7 @@ class Options(Frozen):
     )
 
 
-def refuses(scope: Scope, options: Options) -> Iterator[str]:
+def _refuses(scope: Scope, options: _Options) -> Iterator[str]:
     """Reasons to refuse: unknown cameras, lenses other than pinholes, and rigs other than a camera or a pair."""
     yield from known_cameras(scope)
     yield from pinhole(scope)
@@ -95,7 +95,7 @@ def _sides(rig: Rig) -> dict[str, str] | None:
 class FallingThings(Tree):
     """The tree of a naming."""
 
-    def __init__(self, dataset: Dataset, options: Options) -> None:
+    def __init__(self, dataset: Dataset, options: _Options) -> None:
         super().__init__(dataset)
         self._is_fat = options.naming == "fat"
         self._classes = {key: number for number, key in enumerate(dataset.plan.models, 1)}
@@ -174,10 +174,10 @@ FORMAT = FormatSpec(
     about=__doc__,
     holds=("object poses", "3D boxes", "boxes", "depth", "class masks", "camera poses"),
     read_by=("torchvision", "DOPE"),
-    options=Options,
+    options=_Options,
     channels=CHANNELS,
     names_credits=False,
-    refuses=refuses,
+    refuses=_refuses,
     writer=writer,
     preparer=preparer,
     verify=verify,

@@ -56,7 +56,7 @@ from viewsphere.plugins.format import FormatSpec
 from viewsphere.store import Dataset
 
 
-class Options(Frozen):
+class _Options(Frozen):
     """The name of the tables' folder."""
 
     version: str = Field(
@@ -64,7 +64,7 @@ class Options(Frozen):
     )
 
 
-def _refuses(scope: Scope, options: Options) -> Iterator[str]:
+def _refuses(scope: Scope, options: _Options) -> Iterator[str]:
     """Reasons to refuse: still pictures, distorted lenses, and names that would coincide."""
     yield from sequences(scope)
     yield from unknown_shots(scope)
@@ -79,7 +79,7 @@ def _refuses(scope: Scope, options: Options) -> Iterator[str]:
 class _NuScenes(Tree):
     """The tables and files of a version."""
 
-    def __init__(self, dataset: Dataset, options: Options) -> None:
+    def __init__(self, dataset: Dataset, options: _Options) -> None:
         super().__init__(dataset)
         self._version = options.version
         self._timeline = Timeline(dataset)
@@ -147,7 +147,7 @@ FORMAT = FormatSpec(
     about=__doc__,
     holds=("3D boxes", "tracks", "camera poses", "calibrations", "LiDAR points"),
     read_by=("nuscenes-devkit",),
-    options=Options,
+    options=_Options,
     channels=("rgb",),
     lidar=True,
     keeps_all_objects=True,

@@ -52,7 +52,7 @@ from viewsphere.formats.surreal.writing import Surreal, film_encoder
 from viewsphere.plugins.format import FormatSpec
 
 
-def check() -> None:
+def _check() -> None:
     """Raise MissingExtraError if scipy or ffmpeg is missing."""
     scipy_io("surreal")
     film_encoder()
@@ -63,7 +63,7 @@ def _needs() -> tuple[str, ...]:
     return ("keypoints",)
 
 
-def refuses(scope: Scope) -> Iterator[str]:
+def _refuses(scope: Scope) -> Iterator[str]:
     """Yield the reasons why a data set is not one person in front of one pinhole camera, and the sizes that videos cannot
     have.
     """
@@ -88,8 +88,8 @@ FORMAT = FormatSpec(
     channels=("rgb", "depth", "instances", "body_parts", "flow_backward", "normals"),
     names_credits=False,
     needs=_needs,
-    refuses=refuses,
-    check=check,
+    refuses=_refuses,
+    check=_check,
     writer=writer,
     preparer=preparer,
     verify=verify,

@@ -64,7 +64,7 @@ FAR = 65535
 BACKWARD = ("backwardFlow", "backwardSceneFlow")
 
 
-class Options(Frozen):
+class _Options(Frozen):
     """The version of Virtual KITTI, and its weather."""
 
     version: Literal["1.3.1", "2"] = Field(default="2", description="of the tree: one camera, or two and more maps")
@@ -77,12 +77,12 @@ class Options(Frozen):
     )
 
 
-def _needs(options: Options) -> tuple[str, ...]:
+def _needs(options: _Options) -> tuple[str, ...]:
     """Return the motion of objects, and the additional channels of version 2."""
     return ("velocity", *(("flow_backward", "scene_flow", "scene_flow_backward") if options.version == "2" else ()))
 
 
-def refuses(scope: Scope, options: Options) -> Iterator[str]:
+def _refuses(scope: Scope, options: _Options) -> Iterator[str]:
     """Reasons to refuse: still pictures, unsupported rigs and lenses, more objects or categories than colours, and names with
     spaces or colons.
     """
@@ -98,7 +98,7 @@ def refuses(scope: Scope, options: Options) -> Iterator[str]:
 class _VKitti(Tree):
     """The tree of a version."""
 
-    def __init__(self, dataset: Dataset, options: Options) -> None:
+    def __init__(self, dataset: Dataset, options: _Options) -> None:
         super().__init__(dataset)
         self._old, self._variation = options.version == "1.3.1", options.variation
         self._eyes, self._names = Eyes(dataset), Names.from_classes(dataset.classes)
@@ -176,11 +176,11 @@ FORMAT = FormatSpec(
     about=__doc__,
     holds=("depth", "segmentation", "flow", "scene flow", "boxes", "3D boxes", "tracks", "cameras", "stereo"),
     read_by=("pandas", "numpy"),
-    options=Options,
+    options=_Options,
     channels=("rgb", "depth", "instances", "semantic", "flow"),
     names_credits=False,
     needs=_needs,
-    refuses=refuses,
+    refuses=_refuses,
     writer=writer,
     preparer=preparer,
     verify=verify,
