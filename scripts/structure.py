@@ -19,9 +19,9 @@ from pathlib import Path
 ROOT = Path(__file__).parent.parent
 CORE = "viewsphere"
 LIMITS = {
-    "folders with more than 15 files": (2, 0),
-    "modules under 60 lines with one importer": (16, 0),
-    "public functions and classes of the core": (2670, 2400),
+    "folders with more than 15 files": (0, 0),
+    "modules under 60 lines with one importer": (0, 0),
+    "public functions and classes of the core": (2627, 2400),
     "modules in import cycles": (0, 0),
     "imports of a higher layer": (0, 0),
     "functions over 60 lines": (0, 0),

@@ -2,7 +2,7 @@
 
 import pytest
 
-from viewsphere.caches import mounts
+from viewsphere.caches import arrays
 
 TABLE = r"""
 /dev/sda1 / ext4 rw 0 0
@@ -17,10 +17,10 @@ broken
 @pytest.fixture(autouse=True)
 def table(tmp_path, monkeypatch):
     (tmp_path / "mounts").write_text(TABLE)
-    monkeypatch.setattr(mounts, "MOUNTS", tmp_path / "mounts")
-    mounts._mounts.cache_clear()
+    monkeypatch.setattr(arrays, "MOUNTS", tmp_path / "mounts")
+    arrays._mounts.cache_clear()
     yield tmp_path / "mounts"
-    mounts._mounts.cache_clear()
+    arrays._mounts.cache_clear()
 
 
 @pytest.mark.parametrize(
@@ -36,9 +36,9 @@ def table(tmp_path, monkeypatch):
     ],
 )
 def test_the_longest_mount_decides(file, is_local):
-    assert mounts.is_local(file) == is_local
+    assert arrays.is_local(file) == is_local
 
 
 def test_without_a_table_nothing_is_known_to_be_local(table):
     table.unlink()
-    assert not mounts.is_local("/var/cache/a")
+    assert not arrays.is_local("/var/cache/a")

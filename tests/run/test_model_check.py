@@ -7,7 +7,7 @@ import pytest
 import viewsphere as vs
 from command_line import viewsphere
 from small import small_recipe, tree_hash
-from viewsphere.composing.physics import packages
+from viewsphere.composing import layouts
 from viewsphere.errors import MissingExtraError, ModelError, RecipeError, StoreError
 from viewsphere.run.datasets import converting
 from viewsphere.run.shots.models import check_models
@@ -116,8 +116,8 @@ def test_a_forward_along_the_up_axis_that_the_file_names_is_refused_when_it_is_r
 
 @pytest.mark.parametrize(("layout", "orientation"), [("fall", "upright"), ("stack", "upright"), ("scatter", "stable")])
 def test_a_missing_extra_is_named_when_planned(layout, orientation, monkeypatch):
-    found = packages.find_spec
-    monkeypatch.setattr(packages, "find_spec", lambda name: None if name in ("mujoco", "scipy") else found(name))
+    found = layouts.find_spec
+    monkeypatch.setattr(layouts, "find_spec", lambda name: None if name in ("mujoco", "scipy") else found(name))
     scenes = {"count": 1, "objects": 1, "layout": layout, "orientation": orientation}
     with pytest.raises(MissingExtraError, match=r"^scenes\.(layout|orientation): .* needs .*scipy.*'viewsphere\[physics\]'"):
         vs.plan(small_recipe(scenes=scenes, splits={"by": "scene", "train": 1}))

@@ -5,10 +5,9 @@ import pytest
 
 import viewsphere_zoo as zoo
 from quick import quick
-from viewsphere.assets.cache import load
+from viewsphere.assets.cache import load, part_points
 from viewsphere.assets.mesh import Mesh
 from viewsphere.assets.metadata.model_metadata import metadata_of
-from viewsphere.assets.metadata.part_points import part_points
 from viewsphere.model.annotations.keypoints import At, sided
 from viewsphere.model.model_spec import ModelSpec
 

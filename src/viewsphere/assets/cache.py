@@ -10,18 +10,19 @@ from __future__ import annotations
 
 import hashlib
 import os
-from collections.abc import Callable, Generator, Iterable, Sequence
+from collections.abc import Callable, Generator, Iterable, Mapping, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import replace
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
+
+import numpy as np
 
 from viewsphere.assets.load import check_source, suffix_of
 from viewsphere.assets.mesh import Mesh
 from viewsphere.assets.mesh_file import read_mesh, unpacked
-from viewsphere.assets.metadata.part_points import part_points
 from viewsphere.assets.normalise import normalise, placed
 from viewsphere.assets.parts import selected_parts
 from viewsphere.assets.paths.inside import split_source
@@ -33,6 +34,7 @@ from viewsphere.caches.entries import SUFFIX, publish, read_entry, sweep_once, w
 from viewsphere.errors import ModelError
 from viewsphere.files import open_file, read_bytes
 from viewsphere.limits import limits
+from viewsphere.model.annotations.keypoints import At, Keypoints, Pair, Place, left_and_right
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.thing import TimeStep
 from viewsphere.plugins import checked
@@ -280,3 +282,24 @@ def _store(folder: Path, first: str, path: Path, files: Iterable[Path], mesh: Pa
     with suppress(OSError):
         publish(mesh, _named(folder, _second_digest(first, path, names)))
         write_entry(_named(folder, first), names, {})
+
+
+def part_points(mesh: Mesh, places: Mapping[str, At], skeleton: Sequence[Pair] = ()) -> Keypoints | None:
+    """The points of a mesh, in its axes, for the parts that it has, and the lines between them; None without any."""
+    found = {name: place for name, at in places.items() if (place := _place(mesh, at)) is not None}
+    if not found:
+        return None
+    lines = tuple(pair for pair in skeleton if found.keys() >= {*pair})
+    return Keypoints(points=found, skeleton=lines, flips=left_and_right(found))
+
+
+def _place(mesh: Mesh, at: At) -> Place | None:
+    part = next((mesh.parts.index(name) for name in at.parts.split("|") if name in mesh.parts), None)
+    if part is None:
+        return None
+    corners = mesh.vertices[mesh.triangles[mesh.triangle_part == part]].astype(np.float64).reshape(-1, 3)
+    low, high = corners.min(axis=0), corners.max(axis=0)
+    place = (low + high) / 2 + np.array(at.where) * (high - low) / 2
+    if np.count_nonzero(at.where) > 1:
+        place = corners[((corners - place) ** 2).sum(axis=1).argmin()]
+    return cast("Place", tuple(place.tolist()))

@@ -18,6 +18,7 @@ import os
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cache
 from io import BufferedReader
 from pathlib import Path
 from typing import Any
@@ -26,8 +27,12 @@ import numpy as np
 import xxhash
 from numpy.typing import NDArray
 
-from viewsphere.caches.mounts import is_local
-from viewsphere.files import open_file
+from viewsphere.files import open_file, read_text
+
+LOCAL = frozenset({"bcachefs", "btrfs", "ext2", "ext3", "ext4", "f2fs", "overlay", "tmpfs", "xfs", "zfs"})
+"""Types of file systems, as in proc_mounts(5), whose files only this machine changes."""
+
+MOUNTS = Path("/proc/self/mounts")
 
 MAGIC = b"VSA1"
 MAPPED_BYTES = 1 << 20
@@ -138,3 +143,25 @@ def _mapped(stream: BufferedReader, file: Path) -> memoryview:
     if size >= MAPPED_BYTES and is_local(file):
         return memoryview(mmap.mmap(stream.fileno(), size, access=mmap.ACCESS_COPY))
     return memoryview(bytearray(stream.read()))
+
+
+def is_local(file: Path) -> bool:
+    """True if a file is on a file system that certainly belongs to this machine alone."""
+    path = os.path.realpath(file)
+    best = max((mount for mount in _mounts() if _is_below(path, mount[0])), key=lambda mount: len(mount[0]), default=("", ""))
+    return best[1] in LOCAL
+
+
+@cache
+def _mounts() -> tuple[tuple[str, str], ...]:
+    """The folder and the type of each mounted file system; empty if the system lists none."""
+    try:
+        lines = read_text(MOUNTS, "MAX_TABLE_BYTES").splitlines()
+    except (OSError, ValueError):
+        return ()
+    fields = (line.split(" ") for line in lines)
+    return tuple((part[1].encode().decode("unicode_escape"), part[2]) for part in fields if len(part) > 2)
+
+
+def _is_below(path: str, folder: str) -> bool:
+    return path == folder or path.startswith(folder.rstrip("/") + "/")

@@ -42,8 +42,7 @@ def main() -> None:
         import typer
 
         from viewsphere.cli import completion
-        from viewsphere.cli.commands import app
-        from viewsphere.cli.options import UsageError, explain
+        from viewsphere.cli.commands import UsageError, app, explain
         from viewsphere.cli.terminal import complain, say
         from viewsphere.run.workers.allocator import keep_freed_memory
 

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache, partial
+from importlib.util import find_spec
 from typing import Any, Protocol
 
 import numpy as np
@@ -13,10 +14,9 @@ from numpy.typing import NDArray
 from viewsphere import plugins
 from viewsphere.composing.filling import shape_of
 from viewsphere.composing.physics import EDITION
-from viewsphere.composing.physics.packages import check_packages
 from viewsphere.composing.placing import Draws, Piece, Room, Shape, Way
 from viewsphere.composing.scene.scenery import composed
-from viewsphere.errors import RecipeError
+from viewsphere.errors import MissingExtraError, RecipeError
 from viewsphere.geometry.box3d import Box3d
 from viewsphere.geometry.rotation import random_rotation, rigid, rotation_about
 from viewsphere.model.model_spec import ModelSpec
@@ -145,13 +145,13 @@ def check_layout(layout: Layout, field: str) -> None:
     MissingExtraError for missing packages.
     """
     placer, _ = _placer(layout, field)
-    check_packages(placer.packages, "physics", f"{field}.layout: {placer_of(layout)}")
+    _check_packages(placer.packages, "physics", f"{field}.layout: {placer_of(layout)}")
 
 
 def check_orientation(orientation: str, field: str) -> None:
     """Check that this orientation is available; raises MissingExtraError for missing packages."""
     if orientation == "stable":
-        check_packages(NEEDS, "physics", f"{field}.orientation: stable")
+        _check_packages(NEEDS, "physics", f"{field}.orientation: stable")
 
 
 def has_ways(layout: Layout) -> bool:
@@ -216,7 +216,7 @@ def stable_ways(hull: Float) -> tuple[Float, Float]:
 
 @lru_cache(maxsize=256)
 def _stable_ways(corners: bytes) -> tuple[Float, Float]:
-    check_packages(NEEDS, "physics", "orientation: stable")
+    _check_packages(NEEDS, "physics", "orientation: stable")
     import trimesh
 
     hull = np.frombuffer(corners).reshape(-1, 3)
@@ -229,3 +229,13 @@ def _stable_ways(corners: bytes) -> tuple[Float, Float]:
     order = np.lexsort([*np.round(turns[:, 2], 6).T, -chances]).tolist()  # the same where two are as likely
     kept = [i for i in order if chances[i] >= min(RAREST, chances.max())]
     return turns[kept], chances[kept] / chances[kept].sum()
+
+
+def _check_packages(packages: Iterable[str], extra: str, what: str) -> None:
+    """Check that an extra's packages are installed, without importing them; raises MissingExtraError that
+    begins with `what`.
+    """
+    missing = [name for name in packages if find_spec(name) is None]
+    if missing:
+        names, are = " and ".join(missing), "is" if len(missing) == 1 else "are"
+        raise MissingExtraError(f"{what} needs {names}, which {are} not installed: pip install 'viewsphere[{extra}]'")

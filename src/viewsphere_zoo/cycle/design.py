@@ -9,11 +9,11 @@ from viewsphere_zoo.cycle.brakes import Brake
 from viewsphere_zoo.cycle.coats import Colors
 from viewsphere_zoo.cycle.cockpit import Cockpit
 from viewsphere_zoo.cycle.cranks import Pedal
+from viewsphere_zoo.cycle.fittings import Basket
 from viewsphere_zoo.cycle.forks import Fork
 from viewsphere_zoo.cycle.frames import Frame
 from viewsphere_zoo.cycle.gears import Gears
 from viewsphere_zoo.cycle.layout import Geometry
-from viewsphere_zoo.cycle.luggage import Basket
 from viewsphere_zoo.cycle.saddle import Saddle
 from viewsphere_zoo.cycle.wheels import Wheel
 from viewsphere_zoo.shapes.paint import Color

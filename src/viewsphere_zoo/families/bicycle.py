@@ -9,7 +9,7 @@ import numpy as np
 from viewsphere.assets.mesh import Mesh
 from viewsphere.model.annotations.keypoints import At, sided
 from viewsphere.plugins.family import ZooFamily
-from viewsphere_zoo.cycle import brakes, fittings, luggage
+from viewsphere_zoo.cycle import brakes, fittings
 from viewsphere_zoo.cycle.coats import Coats, coats
 from viewsphere_zoo.cycle.cockpit import clamp, cockpit_pieces
 from viewsphere_zoo.cycle.cranks import crank_pieces
@@ -118,7 +118,7 @@ def _front(p: Bicycle, at: Layout, c: Coats) -> list[Piece]:
         paint = c.frame if p.guards == "frame" else c.extra
         pieces += fittings.mudguard(w, axle, 62, 190, "mudguard_front", paint, c, 0.051)
     if p.basket != "none":
-        pieces += luggage.basket_pieces(at, p.cockpit, p.basket, w, c)
+        pieces += fittings.basket_pieces(at, p.cockpit, p.basket, w, c)
     if p.lights:
         pieces += _lamp(p, at, c)
     return pieces
@@ -171,17 +171,17 @@ def _fitted(p: Bicycle, at: Layout, room: Room, c: Coats) -> list[Piece]:
         paint = c.frame if p.guards == "frame" else c.extra
         pieces += fittings.mudguard(w, axle, 22, 202, "mudguard_rear", paint, c, room.half + 0.004)
     if p.carrier:
-        pieces += luggage.carrier_pieces(at, w, room.half, c)
+        pieces += fittings.carrier_pieces(at, w, room.half, c)
     if p.carrier and p.panniers:
-        pieces += luggage.pannier_pieces(at, w, p.panniers > 1, c)
+        pieces += fittings.pannier_pieces(at, w, p.panniers > 1, c)
     if p.lights and not p.carrier:
         pieces += fittings.rear_light(at.on_seat(p.geometry.seat_tube + 0.045), at.seat, c)
     for k in range(p.bottles):
-        pieces += luggage.bottle_pieces(at, k > 0, c)
+        pieces += fittings.bottle_pieces(at, k > 0, c)
     if p.saddle_bag:
-        pieces += luggage.saddle_bag(at, c)
+        pieces += fittings.saddle_bag(at, c)
     if p.frame_bag:
-        pieces += luggage.frame_bag(at, c)
+        pieces += fittings.frame_bag(at, c)
     if p.kickstand:
         pieces += fittings.kickstand(at, c)
     return pieces

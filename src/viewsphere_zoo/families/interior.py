@@ -9,7 +9,7 @@ import numpy as np
 from viewsphere.assets.mesh import Image, Material, Mesh
 from viewsphere.geometry.box3d import Box3d
 from viewsphere.plugins.family import ZooFamily
-from viewsphere_zoo.indoors import coverings, openings, walls
+from viewsphere_zoo.indoors import coverings, openings
 from viewsphere_zoo.indoors.draws import flat, single
 from viewsphere_zoo.indoors.openings import TRIM, Joinery
 from viewsphere_zoo.indoors.plan import INNER, OUTER, RIGHT, SIDES, Opening, Room, Side
@@ -127,14 +127,14 @@ def _outside(p: Interior) -> list[Piece]:
     low, high = p.hull
     shell = Room("hall", low, high)
     pieces = [
-        Piece("outer_wall", plaster, walls.level(low, high, -SLAB, faces_up=False)),
-        Piece("outer_wall", plaster, walls.level(low, high, p.height + SLAB)),
+        Piece("outer_wall", plaster, openings.level(low, high, -SLAB, faces_up=False)),
+        Piece("outer_wall", plaster, openings.level(low, high, p.height + SLAB)),
     ]
     for side in SIDES:
         found = [(room, o) for room in p.rooms for o in room.openings_in(side) if o.opens == "window"]
         holes = [replace(o, x=-shell.along(side, room, o.x), foot=o.foot + SLAB) for room, o in found]
-        facade = moved(walls.wall(shell.length(side), p.height + 2 * SLAB, holes, 0.0), (0, 0, -SLAB))
-        pieces.append(Piece("outer_wall", plaster, walls.on_side(facade, shell, side, outwards=True)))
+        facade = moved(openings.wall(shell.length(side), p.height + 2 * SLAB, holes, 0.0), (0, 0, -SLAB))
+        pieces.append(Piece("outer_wall", plaster, openings.on_side(facade, shell, side, outwards=True)))
     return pieces
 
 
@@ -146,21 +146,21 @@ def _room(p: Interior, room: Room, joinery: Joinery, images: list[Image], rng: n
     images.append(picture)
     white = coated("ceiling", (0.94, 0.94, 0.93), "matte")
     pieces = [
-        Piece("floor", floor, walls.level(room.low, room.high, 0.0)),
-        Piece("ceiling", white, walls.level(room.low, room.high, p.height, faces_up=False)),
+        Piece("floor", floor, openings.level(room.low, room.high, 0.0)),
+        Piece("ceiling", white, openings.level(room.low, room.high, p.height, faces_up=False)),
         *_ceiling_lamp(p, room),
     ]
     for side in SIDES:
         own = [
-            Piece("wall", paper, walls.wall(room.length(side), p.height, room.openings_in(side), _depth(p, room, side))),
-            Piece("skirting", joinery.frame, walls.skirting(room.length(side), room.openings_in(side), TRIM)),
+            Piece("wall", paper, openings.wall(room.length(side), p.height, room.openings_in(side), _depth(p, room, side))),
+            Piece("skirting", joinery.frame, openings.skirting(room.length(side), room.openings_in(side), TRIM)),
         ]
         for o in room.openings_in(side):
             own += [Piece(q.part, q.material, moved(q.solid, (o.x, 0, o.foot))) for q in _filled(o, joinery, rng)]
             if o.foot <= 0 and o.opens != "entrance":
                 a, b = o.span
-                own.append(Piece("floor", floor, walls.level((a, 0.0), (b, INNER / 2), 0.0)))
-        pieces += walls.placed(own, room, side)
+                own.append(Piece("floor", floor, openings.level((a, 0.0), (b, INNER / 2), 0.0)))
+        pieces += openings.placed(own, room, side)
     return pieces
 
 

@@ -11,9 +11,8 @@ from viewsphere.assets.mesh import Mesh
 from viewsphere.model.place import Lane
 from viewsphere.plugins.family import ZooFamily
 from viewsphere_zoo.shapes.paint import Color
-from viewsphere_zoo.townscape import paving, roadway
+from viewsphere_zoo.townscape import HALF_LENGTH, PLOT, STEP, paving, roadway
 from viewsphere_zoo.townscape.paving import GUTTER
-from viewsphere_zoo.townscape.plan import HALF_LENGTH, PLOT, STEP
 from viewsphere_zoo.townscape.surfaces import finished
 
 WALK = (5.1, 0.7)

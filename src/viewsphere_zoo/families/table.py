@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 from itertools import pairwise
 from typing import Literal
@@ -18,7 +19,6 @@ from viewsphere_zoo.furnishing.underframes import pedestal, sleds, trestles, tri
 from viewsphere_zoo.joinery.coats import BRASS, CHROME
 from viewsphere_zoo.joinery.slabs import level, polygon, slab
 from viewsphere_zoo.shapes.assembly import Piece
-from viewsphere_zoo.shapes.resting import shrunk
 from viewsphere_zoo.shapes.rods import circle
 from viewsphere_zoo.shapes.solids import Float, Solid, join, superellipse
 
@@ -215,7 +215,7 @@ def surfaces(parameters: Table) -> tuple[LevelFace, ...]:
     x, y = p.width / 2, p.depth / 2
     if p.top != "rectangle":
         x, y = 0.7 * x, 0.7 * y
-    found = [shrunk("top", (x, y), p.height)]
+    found = [_shrunk("top", (x, y), p.height)]
     if p.riser:
         found = [LevelFace("top", (0.02 - x, 0.02 - y, x - 0.02, y - 0.22), p.height)]
         found.append(LevelFace("riser", (0.02 - x, y - 0.19, x - 0.02, y - 0.02), p.height + p.riser))
@@ -223,7 +223,7 @@ def surfaces(parameters: Table) -> tuple[LevelFace, ...]:
         a, b = _shelf(p)
         share = 0.66 if p.top != "rectangle" else 1.0
         clear = p.under - p.apron - p.shelf
-        found.append(shrunk("shelf", (share * a - p.leg_size / 2, share * b - p.leg_size / 2), p.shelf, clearance=clear))
+        found.append(_shrunk("shelf", (share * a - p.leg_size / 2, share * b - p.leg_size / 2), p.shelf, clearance=clear))
     return tuple(found)
 
 
@@ -353,3 +353,11 @@ FAMILY = ZooFamily(
     draw=draw,
     surfaces=surfaces,
 )
+
+
+def _shrunk(
+    name: str, half: tuple[float, float], height: float, margin: float = 0.02, clearance: float = math.inf
+) -> LevelFace:
+    """The face of a centred rectangle of these half widths, `margin` inside its border."""
+    x, y = (max(h - margin, 0.01) for h in half)
+    return LevelFace(name, (-x, -y, x, y), height, clearance)

@@ -1,18 +1,25 @@
-"""Windows, doors and their fittings on the wall y = 0 that faces -Y; a hole's foot is at z = 0, its middle at x = 0."""
+"""Walls of rooms with skirting boards; windows, doors and their fittings on the wall y = 0 that faces -Y, a hole's foot at
+z = 0, its middle at x = 0.
+"""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from viewsphere.assets.mesh import Material
-from viewsphere_zoo.indoors.plan import Opening
+from viewsphere_zoo.indoors.plan import SIDES, Opening, Room, Side
 from viewsphere_zoo.shapes.assembly import Piece
 from viewsphere_zoo.shapes.sheets import sheet
-from viewsphere_zoo.shapes.solids import Solid, join, lathe, moved, rounded_box, tube, turned
+from viewsphere_zoo.shapes.solids import Float, Solid, flipped, join, lathe, moved, rounded_box, tube, turned
+from viewsphere_zoo.townscape import masonry
 from viewsphere_zoo.townscape.surfaces import cuboid
+
+SKIRTING = (0.014, 0.085)
+"""Thickness and height of skirting boards, metres."""
 
 TRIM = 0.075
 """Width of the boards around a door."""
@@ -132,3 +139,40 @@ def _leaf(w: float, h: float, hinge: int) -> tuple[Solid, Solid]:
         bars.append(tube([(x, y, 1.03), (x, y + s * 0.045, 1.03), (x + hinge * 0.12, y + s * 0.05, 1.03)], 0.009, 8))
         bars.append(cuboid((x - 0.02, min(y, y + s * 0.006), 0.92), (x + 0.02, max(y, y + s * 0.006), 1.12)))
     return join(*body), join(*bars)
+
+
+def on_side(solid: Solid, room: Room, side: Side, outwards: bool = False) -> Solid:
+    """Return a solid moved to this side of the room; it faces the room, or outwards.
+    It was built on the wall y = 0 that faces -Y, its middle at x = 0.
+    """
+    quarter = SIDES.index(side) + 2 * outwards
+    return moved(turned(solid, 2, -quarter * math.pi / 2), (*room.middle(side), 0.0))
+
+
+def placed(pieces: Sequence[Piece], room: Room, side: Side) -> list[Piece]:
+    """Pieces brought to a side of the room, as `on_side` does."""
+    return [Piece(piece.part, piece.material, on_side(piece.solid, room, side)) for piece in pieces]
+
+
+def wall(length: float, height: float, openings: Sequence[Opening], reveal: float) -> Solid:
+    """A wall with its holes; `reveal` is how deep the holes are lined."""
+    holes = [masonry.Opening(o.x, o.foot, o.width, o.height) for o in openings]
+    return masonry.facade(length, height, holes, reveal=reveal)
+
+
+def skirting(length: float, openings: Sequence[Opening], trim: float) -> Solid:
+    """Boards along the wall's foot, interrupted at doors and their trim."""
+    out, high = SKIRTING
+    doors = sorted((o.span[0] - trim, o.span[1] + trim) for o in openings if o.foot <= 0)
+    ends = [-length / 2, *(edge for span in doors for edge in span), length / 2]
+    pairs = zip(ends[::2], ends[1::2], strict=True)
+    return join(*(cuboid((a, -out, 0.0), (b, 0.0, high)) for a, b in pairs if b - a > 1e-3))
+
+
+def level(low: Sequence[float], high: Sequence[float], z: float, faces_up: bool = True) -> Solid:
+    """A level rectangle that faces up or down."""
+    corners: Float = np.array(
+        [(low[0], low[1], z), (high[0], low[1], z), (high[0], high[1], z), (low[0], high[1], z)], np.float64
+    )
+    solid = Solid(corners, np.array([(0, 1, 2), (0, 2, 3)]))
+    return solid if faces_up else flipped(solid)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -14,9 +14,13 @@ from viewsphere.model.scene import Matrix4
 from viewsphere.plugins.place import PlaceSpec
 from viewsphere_zoo import drawing_of
 from viewsphere_zoo.families import car, driveway, fence, hedge, house, street, tree
-from viewsphere_zoo.townscape import street_life
-from viewsphere_zoo.townscape.plan import HALF_LENGTH, ROAD, STEP
-from viewsphere_zoo.townscape.plots import Plot, allotted
+from viewsphere_zoo.townscape import HALF_LENGTH, PLOT, ROAD, STEP, street_life
+
+if TYPE_CHECKING:
+    from viewsphere_zoo.townscape.building import House
+
+_SETBACK = 15.2
+"""x of the houses' nearest wall, metres."""
 
 VERGE, PAVEMENT, GARDEN = 4.2, 5.95, 6.36
 """x of the middle of the verge, where lamp posts stand; of benches on the pavement; of the gardens' edge; metres."""
@@ -125,7 +129,7 @@ def _named(stands: Iterable[tuple[str, int, Matrix4]]) -> tuple[PlacePiece, ...]
     return tuple(pieces)
 
 
-def _bays(plots: Sequence[Plot], stands: Sequence[_Stand]) -> tuple[Bay, ...]:
+def _bays(plots: Sequence[_Plot], stands: Sequence[_Stand]) -> tuple[Bay, ...]:
     """A parking space on each driveway without a tree over it, in front of the garage and facing it."""
     trees = [(s.x, s.y, _around(s)) for s in stands if s.family == "tree"]
     width, length = BAY
@@ -177,17 +181,17 @@ def _designs(rng: np.random.Generator, family: str, count: int, wanted: Callable
     return seeds
 
 
-def _plots(p: Neighbourhood, plan: street.Street, design: np.random.Generator, rng: np.random.Generator) -> list[Plot]:
+def _plots(p: Neighbourhood, plan: street.Street, design: np.random.Generator, rng: np.random.Generator) -> list[_Plot]:
     """Both sides' plots, right first."""
     seeds = [
         s for g, n in zip((-1, 0, 1), p.houses, strict=True) for s in _designs(design, "house", n, lambda h, g=g: h.garage == g)
     ]
     pool = {s: house.draw(np.random.default_rng(s)) for s in seeds}
     sides = ((1, 0), (-1, 1))
-    return [q for side, k in sides for q in allotted(side, street.plots(k), plan.crossings[k], pool, rng)]
+    return [q for side, k in sides for q in _allotted(side, street.plots(k), plan.crossings[k], pool, rng)]
 
 
-def _paved(plots: Sequence[Plot], design: np.random.Generator) -> list[_Stand]:
+def _paved(plots: Sequence[_Plot], design: np.random.Generator) -> list[_Stand]:
     """A driveway and a path to the front door on each plot."""
     drives = _designs(design, "driveway", 2, lambda d: d.width > 2)
     paths = _designs(design, "driveway", 1, lambda d: d.width < 2 and d.surface != "asphalt")
@@ -218,7 +222,7 @@ def _lamp_posts(p: Neighbourhood, plan: street.Street, rng: np.random.Generator)
     ]
 
 
-def _boundaries(p: Neighbourhood, plots: Sequence[Plot], rng: np.random.Generator) -> list[_Stand]:
+def _boundaries(p: Neighbourhood, plots: Sequence[_Plot], rng: np.random.Generator) -> list[_Stand]:
     """Hedges and fences between the front gardens, and along the pavement, except in front of the houses at the origin."""
     low = _designs(rng, "hedge", 2, lambda h: h.height < 1.3)
     kinds = [("hedge", s) for s in low] + [("fence", s) for s in _designs(rng, "fence", 2, lambda f: f.style != "boards")]
@@ -237,7 +241,7 @@ def _boundaries(p: Neighbourhood, plots: Sequence[Plot], rng: np.random.Generato
     return stands
 
 
-def _trees(p: Neighbourhood, plots: Sequence[Plot], rng: np.random.Generator) -> list[_Stand]:
+def _trees(p: Neighbourhood, plots: Sequence[_Plot], rng: np.random.Generator) -> list[_Stand]:
     """Trees on front lawns, and taller trees behind the houses, in the gaps between them."""
     radius = {s: tree.draw(np.random.default_rng(s)).crown / 2 for s in _designs(rng, "tree", p.trees, lambda t: t.height < 9)}
     seeds = [*radius]
@@ -257,14 +261,16 @@ def _trees(p: Neighbourhood, plots: Sequence[Plot], rng: np.random.Generator) ->
     return stands
 
 
-def _grows(p: Neighbourhood, q: Plot, others: Sequence[_Stand], x: float, y: float, r: float, radius: dict[int, float]) -> bool:
+def _grows(
+    p: Neighbourhood, q: _Plot, others: Sequence[_Stand], x: float, y: float, r: float, radius: dict[int, float]
+) -> bool:
     """Return whether a tree of this radius has room: off the paving, clear of the house, of other trees and of the origin."""
     apart = all(np.hypot(q.side * x - o.x, y - o.y) > r + radius[o.seed] + 0.6 for o in others)
     off = abs(y - q.driveway) > 2.2 and abs(y - q.door) > 1.3
     return bool(apart and off and x + r < q.front - 1.2 and x - r > GARDEN - 0.6 and np.hypot(x, y) - r > p.clear)
 
 
-def _shrubs(plots: Sequence[Plot], rng: np.random.Generator) -> list[_Stand]:
+def _shrubs(plots: Sequence[_Plot], rng: np.random.Generator) -> list[_Stand]:
     """Beds in front of the houses' walls, beside the path to the door."""
     seeds = _designs(rng, "shrub", 2)
     stands: list[_Stand] = []
@@ -279,7 +285,7 @@ def _shrubs(plots: Sequence[Plot], rng: np.random.Generator) -> list[_Stand]:
     return stands
 
 
-def _furniture(plan: street.Street, plots: Sequence[Plot], rng: np.random.Generator) -> list[_Stand]:
+def _furniture(plan: street.Street, plots: Sequence[_Plot], rng: np.random.Generator) -> list[_Stand]:
     """Signs, a bench, a post box, and bins beside the driveways."""
     crossing = _designs(rng, "road_sign", 1, lambda s: s.kind == "crossing")[0]
     limit = _designs(rng, "road_sign", 1, lambda s: s.kind == "limit")[0]
@@ -299,6 +305,71 @@ def _furniture(plan: street.Street, plots: Sequence[Plot], rng: np.random.Genera
             spot = (q.side * float(rng.uniform(7.7, 8.0)), float(y))
             stands.append(_Stand("wheelie_bin", bins[k], *spot, q.turn + float(rng.uniform(-12, 12))))
     return stands
+
+
+@dataclass(frozen=True)
+class _Plot:
+    """One house's plot: its middle along the street, where house, driveway and door are, metres; seed draws the house.
+
+    x is measured from the middle of the road towards the plot; side is 1 on the right (+X) and -1 on the left.
+    """
+
+    side: int
+    y: float
+    driveway: float
+    door: float
+    seed: int
+    house: tuple[float, float]
+    front: float
+    reach: tuple[float, float]
+
+    @property
+    def turn(self) -> float:
+        """Turn about z that faces a piece's front (-Y) to the road, degrees."""
+        return 270.0 if self.side > 0 else 90.0
+
+    @property
+    def ends(self) -> tuple[float, float]:
+        """y of the plot's borders with its neighbours."""
+        return self.y - PLOT / 2, self.y + PLOT / 2
+
+
+def _allotted(
+    side: int,
+    middles: Sequence[float],
+    driveways: Sequence[float],
+    pool: dict[int, House],
+    rng: np.random.Generator,
+) -> list[_Plot]:
+    """A plot for each middle: a house (a seed of `pool`) different from the one next door; a garage, if any, is at the
+    driveway.
+    """
+    plots: list[_Plot] = []
+    for y, ramp in zip(middles, driveways, strict=True):
+        near = -side if ramp > y else side
+        taken = [p.seed for p in plots[-2:]]
+        fitting = [s for s, h in pool.items() if h.garage in (0, near)]
+        fresh = [s for s in fitting if s not in taken]
+        seed = int(rng.choice(fresh or fitting))
+        plots.append(_plot(side, y, ramp, seed, pool[seed], float(rng.uniform(0, 0.7))))
+    return plots
+
+
+def _plot(side: int, y: float, driveway: float, seed: int, house: House, back: float) -> _Plot:
+    width, depth = house.footprint
+    beside = y - np.sign(driveway - y) * 1.6
+    middle = float(beside) if house.garage_x is None else driveway + side * house.garage_x
+    front = _SETBACK + back
+    return _Plot(
+        side=side,
+        y=y,
+        driveway=driveway,
+        door=middle - side * house.door_x,
+        seed=seed,
+        house=(front + depth / 2, middle),
+        front=front,
+        reach=(middle - width / 2, middle + width / 2),
+    )
 
 
 PLACE = PlaceSpec(random=neighbourhood_random, roads=True)

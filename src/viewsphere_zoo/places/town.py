@@ -15,9 +15,8 @@ from viewsphere.model.scene import Matrix4
 from viewsphere.plugins.place import PlaceSpec
 from viewsphere_zoo import drawing_of
 from viewsphere_zoo.families.town_ground import TownGround
-from viewsphere_zoo.townscape import blocks, street_life
+from viewsphere_zoo.townscape import STEP, blocks, street_life
 from viewsphere_zoo.townscape.blocks import CORNER, HALF, LANE, PAVED, Block
-from viewsphere_zoo.townscape.plan import STEP
 
 DESIGNS = {"car": 9, "person": 8, "tree": 6, "shop": 12, "house": 6, "bench": 2, "wheelie_bin": 2, "shrub": 3}
 """Number of designs in a town, for families with many copies; other families have one."""

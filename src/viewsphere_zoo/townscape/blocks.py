@@ -15,8 +15,8 @@ from viewsphere.assets.mesh import Material
 from viewsphere.model.place import Bay, Lane, standing
 from viewsphere_zoo.shapes.assembly import Piece
 from viewsphere_zoo.shapes.solids import Float, Solid, fan, flipped, grid, join
+from viewsphere_zoo.townscape import STEP
 from viewsphere_zoo.townscape.paving import ASPHALT, GRASS, PAINT, PAVING, STONE
-from viewsphere_zoo.townscape.plan import STEP
 from viewsphere_zoo.townscape.roadway import PAINT_TOP, slab
 from viewsphere_zoo.townscape.surfaces import cuboid
 

@@ -11,10 +11,9 @@ from viewsphere.codecs import srgb
 from viewsphere_zoo.shapes.assembly import Piece
 from viewsphere_zoo.shapes.paint import linear
 from viewsphere_zoo.shapes.solids import Float, Solid, grid, join, moved, turned
-from viewsphere_zoo.townscape import textures
+from viewsphere_zoo.townscape import HALF_LENGTH, HALF_WIDTH, KERB, ROAD, STEP, textures
 from viewsphere_zoo.townscape.foliage import blob
 from viewsphere_zoo.townscape.paving import meadow, turf
-from viewsphere_zoo.townscape.plan import HALF_LENGTH, HALF_WIDTH, KERB, ROAD, STEP
 from viewsphere_zoo.townscape.surfaces import Tint, cuboid, prism, waves
 from viewsphere_zoo.townscape.textures import textured
 

@@ -8,8 +8,7 @@ from viewsphere.assets.mesh import Image, Material
 from viewsphere_zoo.shapes.assembly import Piece
 from viewsphere_zoo.shapes.paint import Color
 from viewsphere_zoo.shapes.solids import Float, Solid, flipped, grid
-from viewsphere_zoo.townscape import textures
-from viewsphere_zoo.townscape.plan import DROPPED, HALF_LENGTH, HALF_WIDTH, KERB, PAVEMENT, ROAD, STEP
+from viewsphere_zoo.townscape import DROPPED, HALF_LENGTH, HALF_WIDTH, KERB, PAVEMENT, ROAD, STEP, textures
 from viewsphere_zoo.townscape.surfaces import Tint, cuboid, waves
 from viewsphere_zoo.townscape.textures import textured
 

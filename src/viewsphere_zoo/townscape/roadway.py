@@ -9,8 +9,8 @@ import numpy as np
 from viewsphere_zoo.shapes.assembly import Piece
 from viewsphere_zoo.shapes.paint import metal
 from viewsphere_zoo.shapes.solids import Solid, join, lathe, moved
+from viewsphere_zoo.townscape import HALF_LENGTH, ROAD
 from viewsphere_zoo.townscape.paving import CROSSING, GUTTER, PAINT, PATCH
-from viewsphere_zoo.townscape.plan import HALF_LENGTH, ROAD
 from viewsphere_zoo.townscape.surfaces import cuboid
 
 PAINT_TOP, PATCH_TOP, IRON_TOP = 0.004, 0.003, 0.006

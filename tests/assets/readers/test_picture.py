@@ -101,9 +101,9 @@ def test_what_shows_nothing_is_refused(write, data, said):
 
 
 def test_a_large_picture_is_reduced_and_keeps_its_proportions(write, monkeypatch):
-    from viewsphere.assets.readers.picture import reading as picture
+    from viewsphere.assets.paths import folder
 
-    monkeypatch.setattr(picture, "SHARPEST", 16)
+    monkeypatch.setattr(folder, "SHARPEST", 16)
     shades = np.repeat(np.arange(40, dtype=np.uint8) * 6, 20).reshape(40, 20)
     mesh, _ = load_model(write("tall.png", encoded(np.dstack([shades] * 3))))
     (image,) = mesh.images

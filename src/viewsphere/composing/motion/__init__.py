@@ -6,10 +6,8 @@ Kinds import from here: their inputs (`Start`, `Pose`), paths (`Lane`, `curve_th
 
 from __future__ import annotations
 
-from viewsphere.composing.motion.shared.heading import Heading, headed, to_the_right
 from viewsphere.composing.motion.shared.made import Mover, check_motion, check_motions, mover
-from viewsphere.composing.motion.shared.start import Move, Origin, Pose, Start
-from viewsphere.composing.motion.shared.way import curve_through
+from viewsphere.composing.motion.shared.start import Heading, Move, Origin, Pose, Start, curve_through, headed, to_the_right
 from viewsphere.model.fields.numbers import Strength
 from viewsphere.model.place import Lane
 from viewsphere.recipe.draws import Drawn

@@ -5,20 +5,29 @@ A trajectory computes all instants of a sequence at once, so that the division i
 
 from __future__ import annotations
 
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, cast
 
 import numpy as np
+from numpy.typing import NDArray
 
 from viewsphere import plugins
-from viewsphere.composing.trajectories.shared.aim import aimed, around, focuses
-from viewsphere.composing.trajectories.shared.shake import Handheld, shaken
+from viewsphere.composing.noise import noise
+from viewsphere.composing.trajectories.shared.aim import DIGITS, aimed, around, focuses
 from viewsphere.composing.trajectories.shared.world import RigPose, Trajectory, World
 from viewsphere.composing.viewpoints.camera import looking
+from viewsphere.geometry.rotation import compose, rigid, rotation_about
 from viewsphere.model.instant import Instant, Viewpoint, viewpoint_of
 from viewsphere.model.scene import IDENTITY, Vector
+from viewsphere.model.sensors.camera import Intrinsics
 from viewsphere.plugins.trajectory import TrajectorySpec
+from viewsphere.recipe.cameras.aim import Shake
 from viewsphere.recipe.cameras.viewpoints import Grid, Jitter, Normal, Sphere, Viewpoints
+
+Float = NDArray[np.float64]
 
 __all__ = [
     "RigPose",
@@ -49,7 +58,7 @@ def trajectory(viewpoints: Viewpoints, folder: Path) -> Trajectory:
         raise ValueError(f"trajectory: expected viewpoints that move, got {cast(Any, viewpoints).kind}")
     spec = plugins.load(TrajectorySpec, cast(Any, viewpoints).kind)
     steady: Trajectory = spec.trajectory(viewpoints, folder)
-    return Handheld(steady, viewpoints.shake) if viewpoints.shake else steady
+    return _Handheld(steady, viewpoints.shake) if viewpoints.shake else steady
 
 
 def standing(viewpoint: Viewpoint, focus: Vector) -> RigPose:
@@ -66,3 +75,38 @@ def instant(pose: RigPose, index: int, seconds: float, view: int, bins: float, *
     viewpoint = viewpoint_of(pose.world_from_rig, pose.focus, view, bins).rounded()
     seen = {"focus": pose.focus, "viewpoint": viewpoint, "intrinsics": pose.intrinsics}
     return Instant(index=index, world_from_rig=(a, b, c, IDENTITY[3]), seconds=seconds, **seen, **more)
+
+
+def shaken(poses: Sequence[RigPose], shake: Shake, times: Float, world: World) -> tuple[RigPose, ...]:
+    """The poses, turned about and moved along their own axes by smooth noise seeded by the sequence's names."""
+    return tuple(_shaken(poses, shake, times, world))
+
+
+def _shaken(poses: Sequence[RigPose], shake: Shake, times: Float, world: World) -> Iterator[RigPose]:
+    hand = noise(world.rng("shake"), 6, shake.hertz)
+    for pose, seconds in zip(poses, times.tolist(), strict=True):
+        off = hand.values_at(seconds)
+        by = rigid(rotation_about(math.radians(shake.degrees) * off[:3]), shake.mm / 1000 * off[3:])
+        yield RigPose(np.round(compose(pose.world_from_rig, by), DIGITS) + 0.0, pose.focus, pose.intrinsics)
+
+
+@dataclass(frozen=True, eq=False)
+class _Handheld:
+    """A trajectory with shake."""
+
+    steady: Trajectory
+    shake: Shake
+
+    @property
+    def digest(self) -> str:
+        """The value of the unshaken trajectory."""
+        return self.steady.digest
+
+    @property
+    def intrinsics(self) -> Intrinsics | None:
+        """The value of the unshaken trajectory."""
+        return self.steady.intrinsics
+
+    def poses(self, times: Float, world: World) -> tuple[RigPose, ...]:
+        """See `Trajectory.poses`."""
+        return shaken(self.steady.poses(times, world), self.shake, times, world)

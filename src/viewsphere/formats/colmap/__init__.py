@@ -33,9 +33,8 @@ import numpy as np
 from pydantic import Field
 
 from viewsphere.formats import Scope
-from viewsphere.formats.colmap.as_recipe import source_cameras
 from viewsphere.formats.colmap.points import Sights
-from viewsphere.formats.colmap.reading import read
+from viewsphere.formats.colmap.reading import read, source_cameras
 from viewsphere.formats.colmap.records import KINDS, Camera, Frame, Image, Record, Rig, pose_of
 from viewsphere.formats.shared.cameras import Moment, Rigs, world_of
 from viewsphere.formats.shared.writing.pictures import picture, suffix_of

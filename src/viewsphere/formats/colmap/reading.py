@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from viewsphere.errors import StoreError
 from viewsphere.files import read_bytes, read_text
+from viewsphere.formats.shared.reading.as_recipe import cameras_again, nearest_up, pose_of
 from viewsphere.formats.shared.reading.image_lists import MISTAKES, one_line
 from viewsphere.formats.shared.reading.posed_pictures import (
     MOST,
@@ -24,9 +25,14 @@ from viewsphere.formats.shared.reading.posed_pictures import (
 )
 from viewsphere.geometry.lenses import LensParameters, opencv_parameters
 from viewsphere.geometry.rotation import matrix_from_quaternion, transform
+from viewsphere.model.listed import ListedShot
 from viewsphere.model.sensors.camera import Intrinsics
 from viewsphere.store.foreign import ForeignDataset
 from viewsphere.store.paths import is_name
+from viewsphere.store.source_cameras import SourceCameras, refuse_any
+
+_FOLDERS = ("", "sparse/0", "sparse", "dense/0", "dense")
+"""The folders in which COLMAP's programs put meshes, relative to the folder of the data set."""
 
 PARAMETERS = {
     "SIMPLE_PINHOLE": (0, "f cx cy"),
@@ -198,3 +204,24 @@ def _binary_images(file: Path) -> Iterator[_Image]:
             raise ValueError("a name that is cut off")
         yield _Image(tuple(pose), camera, data[at + 64 : end].decode())
         at = end + 9 + 24 * struct.unpack_from("<Q", data, end + 1)[0]
+
+
+def source_cameras(path: Path) -> SourceCameras:
+    """Return every camera of a folder with `sparse/0`, or of such a `sparse/0`, text or binary, in the order of their images'
+    names.
+
+    Pictures are not required. Up is the axis of the world that is nearest to the cameras' mean up. Raises StoreError if there
+    is no model, for an image without its camera, and for a lens that viewsphere does not support.
+    """
+    model = read_model(path)
+    problems: list[str] = []
+    shots: list[ListedShot] = []
+    for image in model.images:
+        try:
+            lens, pose, split = model.view(image)
+            camera_of(lens, pose)
+            shots.append(ListedShot(split=split, image=image.name, world_from_camera=pose_of(pose), camera=lens))
+        except MISTAKES as error:
+            problems.append(f"{model.file}: image {image.name!r:.80}: {one_line(error)}")
+    refuse_any(problems)
+    return cameras_again(path, tuple(shots), path, _FOLDERS, "colmap", nearest_up(shots))

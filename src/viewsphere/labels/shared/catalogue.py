@@ -2,23 +2,43 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Container
+from collections.abc import Callable, Container, Iterable, Iterator, Mapping
 from functools import cache
 from importlib.util import find_spec
-from typing import Any
+from typing import Any, TypeVar
 
 from viewsphere import plugins
 from viewsphere.errors import PluginError
 from viewsphere.labels.shared.spec import ChannelLabel, Drawing, LabelSpec, ObjectLabel, Picture, SampleLabel
-from viewsphere.labels.shared.table import Table
 from viewsphere.model.channel import DEFAULT_CHANNELS, PASSES, Channel, picture_of
 from viewsphere.model.sample import Sample
 
+T = TypeVar("T")
+
+
+class _Table(Mapping[str, T]):
+    """Labels, or facts about them, by name. Reading a name imports only its label; iterating over the table imports all."""
+
+    def __init__(self, names: Callable[[], Iterable[str]], of: Callable[[str], T | None]) -> None:
+        self._names, self._of = names, of
+
+    def __getitem__(self, name: str) -> T:
+        found = self._of(name)
+        if found is None:
+            raise KeyError(name)
+        return found
+
+    def __iter__(self) -> Iterator[str]:
+        return (name for name in self._names() if self._of(name) is not None)
+
+    def __len__(self) -> int:
+        return sum(1 for _ in self)
+
 
 @cache
-def labels() -> Table[LabelSpec]:
+def labels() -> _Table[LabelSpec]:
     """Return every label by name: first the channels that recipes keep by default, then the others in alphabetical order."""
-    return Table(label_names, _loadable)
+    return _Table(label_names, _loadable)
 
 
 @cache
@@ -58,9 +78,9 @@ def is_channel(name: str) -> bool:
 
 
 @cache
-def channel_labels() -> Table[ChannelLabel]:
+def channel_labels() -> _Table[ChannelLabel]:
     """Labels of pixels by name."""
-    return Table(label_names, lambda name: label if isinstance(label := _loadable(name), ChannelLabel) else None)
+    return _Table(label_names, lambda name: label if isinstance(label := _loadable(name), ChannelLabel) else None)
 
 
 @cache
@@ -100,9 +120,9 @@ def _makes_regular(text: bytes) -> bool:
 
 
 @cache
-def sample_labels() -> Table[SampleLabel]:
+def sample_labels() -> _Table[SampleLabel]:
     """Labels of whole pictures by name."""
-    return Table(label_names, lambda name: label if isinstance(label := _loadable(name), SampleLabel) else None)
+    return _Table(label_names, lambda name: label if isinstance(label := _loadable(name), SampleLabel) else None)
 
 
 def sample_labels_of(requested: Container[str]) -> tuple[SampleLabel, ...]:
@@ -118,9 +138,9 @@ def on_request() -> dict[str, ObjectLabel | SampleLabel]:
 
 
 @cache
-def makers() -> Table[ObjectLabel]:
+def makers() -> _Table[ObjectLabel]:
     """Labels of objects by the names of their fields."""
-    return Table(lambda: [field.name for label in object_labels() for field in label.fields], _maker)
+    return _Table(lambda: [field.name for label in object_labels() for field in label.fields], _maker)
 
 
 @cache
@@ -131,9 +151,9 @@ def _maker(field: str) -> ObjectLabel | None:
 
 
 @cache
-def channels() -> Table[Channel]:
+def channels() -> _Table[Channel]:
     """Return every channel that a recipe's `channels` may name: first the passes, then the labels of pixels."""
-    return Table(lambda: (*PASSES, *channel_labels()), _channel)
+    return _Table(lambda: (*PASSES, *channel_labels()), _channel)
 
 
 def _channel(name: str) -> Channel | None:

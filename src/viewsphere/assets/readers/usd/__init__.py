@@ -21,7 +21,7 @@ def _read(folder: ModelFolder) -> tuple[Mesh, FileFacts]:
 
 def _timeline(folder: ModelFolder) -> dict[str, Any]:
     """The animation's frames, see `animated.timeline`."""
-    from viewsphere.assets.readers.usd.animated import timeline
+    from viewsphere.assets.readers.usd.layers import timeline
 
     return timeline(folder)
 

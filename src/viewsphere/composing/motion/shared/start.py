@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import math
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -11,11 +12,19 @@ from numpy.typing import ArrayLike, NDArray
 
 from viewsphere.assets.animation.clip import Timeline
 from viewsphere.composing.placing import Draws
+from viewsphere.errors import RecipeError
+from viewsphere.geometry.curve import Curve, spline
 from viewsphere.geometry.rotation import compose, rigid
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.place import Lane
-from viewsphere.model.scene import Matrix4
+from viewsphere.model.scene import Matrix4, Vector
 from viewsphere.model.thing import TimeStep
+
+Heading = Literal["keep", "level", "along"]
+"""keep: unchanged; level: turned about the vertical only, upright; along: also tilted uphill and downhill."""
+
+_LEVEL = 1e-9
+"""Length of a unit vector's horizontal part below which the vector counts as vertical, without an azimuth."""
 
 Float = NDArray[np.float64]
 
@@ -79,3 +88,30 @@ Move = Callable[[float, Pose], Pose | None]
 """Returns the pose at a time, seconds from the sequence's first instant, given the thing's pose without this motion; None while
 the thing is absent. Called for any times in any order.
 """
+
+
+def curve_through(points: Sequence[Vector], closed: bool, field: str) -> Curve:
+    """The smooth curve through points, metres; raises RecipeError, beginning with `field`, for too few or coinciding points."""
+    try:
+        return spline(points, closed)
+    except ValueError as error:
+        raise RecipeError(f"{field}: {error}") from None
+
+
+def headed(pose: Pose, direction: ArrayLike, heading: Heading) -> Pose:
+    """Return the pose with its front (-Y) turned to a unit vector (3,) of the world. A vertical vector leaves it unchanged."""
+    x, y, z = np.asarray(direction, np.float64).tolist()
+    level = math.hypot(x, y)
+    if heading == "keep" or level < _LEVEL:
+        return pose
+    run, rise = (level, z) if heading == "along" else (1.0, 0.0)
+    c, s = x / level, y / level
+    left, back, up = (-s, c, 0.0), (-c * run, -s * run, -rise), (-c * rise, -s * rise, run)
+    return pose.facing(np.array([left, back, up]).T)
+
+
+def to_the_right(direction: ArrayLike) -> Float:
+    """The level unit vector (3,) to the right of a direction (3,), seen from above; zero if it is vertical."""
+    x, y, _ = np.asarray(direction, np.float64).tolist()
+    level = math.hypot(x, y)
+    return np.zeros(3) if level < _LEVEL else np.array([y / level, -x / level, 0.0])

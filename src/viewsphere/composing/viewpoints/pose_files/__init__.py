@@ -49,14 +49,10 @@ def _kind(path: Path) -> str:
 
 def _read(path: Path, kind: str) -> PoseFile:
     match kind:
-        case "csv" | "view":
-            from viewsphere.composing.viewpoints.pose_files import orbits
+        case "csv" | "view" | "tum" | "kitti":
+            from viewsphere.composing.viewpoints.pose_files import text_files
 
-            return orbits.read_csv(path) if kind == "csv" else orbits.read_view(path)
-        case "tum" | "kitti":
-            from viewsphere.composing.viewpoints.pose_files import trajectories
-
-            return trajectories.read_tum(path) if kind == "tum" else trajectories.read_kitti(path)
+            return text_files.READERS[kind](path)
         case "nerfstudio":
             from viewsphere.composing.viewpoints.pose_files.nerfstudio import read_nerfstudio
 

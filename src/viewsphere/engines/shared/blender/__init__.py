@@ -45,10 +45,10 @@ def stage(shot: Shot, load: Load) -> CyclesStage:
 
 
 def indices(shot: Shot, instant: int, sensor: int, load: Load) -> NDArray[np.int32] | None:
-    """Ids of the objects that Cycles sees in each pixel, (H, W) int32; see `index_pass.indices`."""
-    from viewsphere.engines.shared.blender import index_pass
+    """Ids of the objects that Cycles sees in each pixel, (H, W) int32; see `staging.indices`."""
+    from viewsphere.engines.shared.blender import staging
 
-    return index_pass.indices(shot, instant, sensor, load)
+    return staging.indices(shot, instant, sensor, load)
 
 
 def save(shot: Shot, samples: Sequence[Sample], load: Load, file: Path, data: str) -> tuple[str, ...]:

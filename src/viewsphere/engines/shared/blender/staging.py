@@ -22,7 +22,7 @@ from viewsphere.engines.shared.blender.border import border_of
 from viewsphere.engines.shared.blender.file_frame import FileFrame
 from viewsphere.engines.shared.blender.lens import Sweeping, resampled, views_of
 from viewsphere.engines.shared.blender.options import AnyOptions, options_of
-from viewsphere.engines.shared.blender.requests import Request, kinds_of, materials_request, scene_request, staged
+from viewsphere.engines.shared.blender.requests import Request, kinds_of, materials_request, members_of, scene_request, staged
 from viewsphere.engines.shared.blender.scripts import script_request
 from viewsphere.engines.shared.blender.texels import Kind, Levels
 from viewsphere.engines.shared.passes import shading_of
@@ -37,6 +37,9 @@ from viewsphere.rendering.seen import seen_by
 from viewsphere.rendering.weather.falling import fall_in
 from viewsphere.truth.raster.geometry import Geometry
 from viewsphere.truth.raster.visibility import Visibility
+
+_SHARP = {"pixel_filter_type": "GAUSSIAN", "filter_width": 0.01}
+"""Settings of Cycles that make it sample only the middles of pixels."""
 
 STAGE_SECONDS = 600.0
 """Seconds after which a Blender that has not built its scene counts as hung."""
@@ -428,3 +431,34 @@ def build_stage(shot: Shot, load: Load) -> CyclesStage:
     if options.renderer == "workbench" and shot.shutter:
         raise RecipeError("time.shutter: expected 0 with engine: workbench, which cannot blur; take raster, cycles or eevee")
     return CyclesStage(Arrangements.build(shot, load), options, keeper_of(find_blender(options.python)))
+
+
+def indices(shot: Shot, instant: int, sensor: int, load: Load) -> NDArray[np.int32] | None:
+    """Ids of the objects that Cycles sees through the middles of a sensor's pixels at an instant, (H, W) int32, 0 for none;
+    None for a lens that Blender lacks.
+
+    A Blender that dies or hangs is restarted once. Raises ModelError if it dies again, UserError if Blender cannot be used, or
+    cannot build the scene.
+    """
+    camera = shot.camera(instant, sensor)
+    if not camera.lens.is_linear or camera.intrinsics.skew:
+        return None
+    python = shot.engine_options.get("python") if shot.engine == "cycles" else None
+    options = {"python": python, "samples": 1, "bounces": 0, "denoise": "off", "settings": _SHARP}
+    stage = build_stage(shot.model_copy(update={"engine": "cycles", "engine_options": options}), load).arrangement(instant)
+    view = FileFrame.from_blend(shot.scene.blend).camera(camera_request(camera))
+    try:
+        return stage.keeper.insist(partial(_rendered, stage, view), stage.named)
+    except BlenderError as error:
+        raise UserError(f"{stage.named}: {error.reason}") from error
+    finally:
+        stage.keeper.forget()  # the numbers are not those of the file
+
+
+def _rendered(stage: Arrangement, view: dict[str, Any]) -> NDArray[np.int32]:
+    """The ids in Blender's pass, for a camera."""
+    process = stage.keeper.process_for(stage)
+    out = process.folder / "seen.npy"
+    process.ask("number", STAGE_SECONDS, members=members_of(stage.shot), alpha=stage.shot.label_alpha)
+    process.ask("render", FRAME_SECONDS, camera=view, out=str(out), transparent=True, border=None, passes=["index"])
+    return np.rint(load_array(out.with_suffix(".index.npy"))[..., 0]).astype(np.int32)

@@ -1,13 +1,17 @@
-"""Poses as azimuth, elevation, distance and tilt: CSV with a header, and Render for CNN's view files."""
+"""Files of text lines: orbits (CSV, Render for CNN's view files), and trajectories of TUM RGB-D and of KITTI odometry."""
 
 from __future__ import annotations
 
 import csv
+from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
+
 from viewsphere.composing.tables import known_columns
-from viewsphere.composing.viewpoints.pose_files.entries import Orbit, PoseFile
+from viewsphere.composing.viewpoints.pose_files.entries import Extrinsics, Orbit, PoseFile
 from viewsphere.composing.viewpoints.pose_files.lines import counted, number, read_lines, read_text
+from viewsphere.composing.viewpoints.pose_files.motions import from_matrix, from_quaternion, motion
 from viewsphere.errors import RecipeError
 from viewsphere.validation.errors import nearest
 
@@ -16,7 +20,7 @@ TILTS = ("tilt", "theta", "in_plane")
 """Names of the roll: viewsphere's, PASCAL3D+'s, and the one of pose estimators; all turn the same way."""
 
 
-def read_csv(path: Path) -> PoseFile:
+def _read_csv(path: Path) -> PoseFile:
     """A table with the columns azimuth, elevation, distance and, optionally, tilt (or theta); other columns are ignored.
 
     Degrees and metres. PASCAL3D+'s `viewpoint` fields have these names and meanings
@@ -43,7 +47,7 @@ def read_csv(path: Path) -> PoseFile:
     return PoseFile(tuple(entries))
 
 
-def read_view(path: Path) -> PoseFile:
+def _read_view(path: Path) -> PoseFile:
     """Lines of azimuth, elevation, tilt, distance (https://github.com/ShapeNet/RenderForCNN, `render_model_views.py`)."""
     entries: list[Orbit] = []
     for line, words in read_lines(path):
@@ -60,3 +64,32 @@ def _orbit(values: list[float], where: str) -> Orbit:
     if orbit.distance <= 0:
         raise RecipeError(f"{where}: distance: expected metres above 0; found {orbit.distance:g}")
     return orbit
+
+
+def _read_tum(path: Path) -> PoseFile:
+    """Lines of time, x, y, z, qx, qy, qz, qw: camera to world (https://cvg.cit.tum.de/data/datasets/rgbd-dataset/file_formats)."""
+    entries, times = list[Extrinsics](), list[float]()
+    for line, words in read_lines(path):
+        where = f"{path}:{line}"
+        seconds, x, y, z, qx, qy, qz, qw = counted(words, 8, where)
+        entries.append(motion(from_quaternion((qw, qx, qy, qz), where), np.array([x, y, z]), where))
+        times.append(seconds)
+    return PoseFile(tuple(entries), times=tuple(times))
+
+
+def _read_kitti(path: Path) -> PoseFile:
+    """Lines of 12 numbers, the rows of a 3x4 camera-to-world matrix (https://www.cvlibs.net/datasets/kitti/eval_odometry.php).
+
+    The world is the first camera's: y points down.
+    """
+    entries = tuple(from_matrix(counted(words, 12, f"{path}:{line}"), f"{path}:{line}") for line, words in read_lines(path))
+    return PoseFile(entries, up="-y")
+
+
+READERS: dict[str, Callable[[Path], PoseFile]] = {
+    "csv": _read_csv,
+    "view": _read_view,
+    "tum": _read_tum,
+    "kitti": _read_kitti,
+}
+"""Functions that read a file, by format; they raise RecipeError, with file and line."""
