@@ -1,4 +1,4 @@
-"""Arrays to OpenEXR files and back, in memory: scan lines, ZIP compression, 32-bit channels, every bit kept.
+"""Arrays to OpenEXR files and back, in memory: scan lines, ZIP compression, 16- or 32-bit channels, every bit kept.
 
 Format: https://openexr.com/en/latest/OpenEXRFileLayout.html. The reader reads only files that the writer made.
 """
@@ -18,21 +18,23 @@ from viewsphere.errors import UserError
 
 _MAGIC = struct.pack("<II", 20000630, 2)
 _ZIP, _LINES = 3, 16
-_KINDS = {np.dtype(np.int32): 0, np.dtype(np.float32): 2}
+_KINDS = {np.dtype(np.int32): 0, np.dtype(np.float16): 1, np.dtype(np.float32): 2}
 _NAMES = {1: ("Z",), 2: ("R", "G"), 3: ("R", "G", "B")}
 _WINDOW = b"dataWindow\0box2i\0" + struct.pack("<I", 16)
 MOST_DEFLATED = 1032  # greatest ratio of a deflated stream's content to its own size
+BRIGHTEST_HALF = 65504.0
+"""The largest finite half float (IEEE 754 binary16)."""
 _FOREIGN = "EXR: expected viewsphere's own, found a damaged file or another program's"
 
 
 def encode_exr(array: NDArray[Any]) -> bytes:
-    """An EXR file of (H, W), as channel Z, or (H, W, 2 or 3), as channels R, G and B; float32 or int32, not empty.
+    """An EXR file of (H, W), as channel Z, or (H, W, 2 or 3), as channels R, G and B; float16, float32 or int32, not empty.
 
     EXR has no signed integers: int32 numbers become UINT numbers with the same bits.
     """
     components = 1 if array.ndim == 2 else array.shape[-1]
     if array.ndim not in (2, 3) or array.size == 0 or components not in _NAMES or array.dtype not in _KINDS:
-        raise ValueError(f"encode_exr: expected (H, W) or (H, W, 2..3) float32 or int32, got {array.shape} {array.dtype}")
+        raise ValueError(f"encode_exr: expected (H, W) or (H, W, 2..3) of 16 or 32 bits, got {array.shape} {array.dtype}")
     height, width = array.shape[:2]
     head = _header(width, height, components, _KINDS[array.dtype])
     planes = array.reshape(height, width, components)[:, :, ::-1]  # channels lie in the order of their names: B, G, R
@@ -45,6 +47,11 @@ def encode_exr(array: NDArray[Any]) -> bytes:
         blocks.append(struct.pack("<iI", y, len(body)) + body)
     places = np.cumsum([len(head) + 8 * len(blocks), *map(len, blocks[:-1])]).astype("<u8")
     return b"".join((head, places.tobytes(), *blocks))
+
+
+def half_floats(light: NDArray[np.float32]) -> NDArray[np.float16]:
+    """Light as half floats, rounded to 11 bits; light above their largest number, 65,504, becomes this number."""
+    return np.minimum(light, np.float32(BRIGHTEST_HALF)).astype(np.float16)
 
 
 def _header(width: int, height: int, components: int, kind: int) -> bytes:
@@ -92,7 +99,7 @@ def decode_exr(data: bytes) -> NDArray[Any]:
     blocks = -(-height // _LINES)
     table, position = position, position + 8 * blocks
     places: list[int] = []
-    rows = np.empty((height, 4 * width * components), np.uint8)
+    rows = np.empty((height, dtype.itemsize * width * components), np.uint8)
     try:
         for y in range(0, height, _LINES):
             line, size = struct.unpack_from("<iI", data, position)
@@ -122,7 +129,7 @@ def _layout(data: bytes) -> tuple[int, int, int, np.dtype[Any], int]:
         for components in _NAMES:
             for dtype, kind in _KINDS.items():
                 own = _header(right + 1, bottom + 1, components, kind)
-                size = 4 * components * (right + 1) * (bottom + 1)
+                size = dtype.itemsize * components * (right + 1) * (bottom + 1)
                 if right >= 0 and bottom >= 0 and data.startswith(own) and size <= MOST_DEFLATED * len(data):
                     return right + 1, bottom + 1, components, dtype, len(own)
     raise UserError(_FOREIGN)

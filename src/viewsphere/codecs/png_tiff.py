@@ -40,7 +40,8 @@ def encode_png(
     """A PNG file of a picture: (H, W) bool (1 bit), uint8 or uint16, or (H, W, 3 or 4) uint8 or uint16, not empty.
 
     With a `palette` (n, 3), (H, W) uint8 are indices of its colours. `unit` is the length in metres of one step of (H, W)
-    (pCAL). For a `rendered` picture with 8-bit colours, only runs are matched, which halves the time.
+    (pCAL). For a `rendered` picture with 8-bit colours, only runs are matched, which halves the time; 16-bit ones are filtered,
+    which takes a quarter off the file.
     """
     components = 1 if array.ndim == 2 else array.shape[-1]
     dtypes = (np.bool_, np.uint8, np.uint16) if array.ndim == 2 else (np.uint8, np.uint16)
@@ -59,12 +60,14 @@ def encode_png(
     if rendered and array.dtype == np.uint8 and components > 1:
         body = _zlib(array.reshape(height, -1), components)
     else:
-        body = compressed(_filtered(array, components))
+        body = compressed(_filtered(array, components, rendered))
     return b"".join((_SIGNATURE, _chunk(b"IHDR", header), more, _chunk(b"IDAT", body), _chunk(b"IEND", b"")))
 
 
-def _filtered(array: NDArray[Any], components: int) -> NDArray[np.uint8]:
-    """The filtered scan lines, each preceded by the filter's number: Sub for bytes, None for bits and for 16-bit ids."""
+def _filtered(array: NDArray[Any], components: int, rendered: bool) -> NDArray[np.uint8]:
+    """The filtered scan lines, each preceded by the filter's number: Sub for bytes and for rendered pictures, None for bits
+    and for other 16-bit numbers.
+    """
     height = len(array)
     if array.dtype == np.bool_:
         rows = np.packbits(array, axis=1)
@@ -73,12 +76,13 @@ def _filtered(array: NDArray[Any], components: int) -> NDArray[np.uint8]:
     else:
         rows = array.reshape(height, -1)
     lines = np.zeros((height, 1 + rows.shape[1]), np.uint8)
-    if array.dtype != np.uint8:
+    if array.dtype != np.uint8 and not (rendered and array.dtype == np.uint16):
         lines[:, 1:] = rows
         return lines
+    size = components * array.dtype.itemsize
     lines[:, 0] = _SUB
-    lines[:, 1 : 1 + components] = rows[:, :components]
-    np.subtract(rows[:, components:], rows[:, :-components], out=lines[:, 1 + components :])
+    lines[:, 1 : 1 + size] = rows[:, :size]
+    np.subtract(rows[:, size:], rows[:, :-size], out=lines[:, 1 + size :])
     return lines
 
 
@@ -160,15 +164,16 @@ def _png_pixels(header: bytes, body: bytes) -> NDArray[Any]:
         raise UserError(_FOREIGN_PNG)
     check_size(width, height)
     lines = np.frombuffer(_inflated(body, height * (1 + stride), "PNG"), np.uint8).reshape(height, -1)
-    sub = depth == 8
+    sub = depth == 8 or (depth == 16 and lines[0, 0] == _SUB)
     if np.any(lines[:, 0] != (_SUB if sub else 0)):
         raise UserError(_FOREIGN_PNG)
     if depth == 1:
         return np.unpackbits(lines[:, 1:], axis=1, count=width).astype(np.bool_)
+    pixels = lines[:, 1:].reshape(height, width, components * depth // 8)
+    if sub:
+        pixels = np.add.accumulate(pixels, axis=1, dtype=np.uint8)
     if depth == 16:
-        deep = np.ascontiguousarray(lines[:, 1:]).view(">u2").astype(np.uint16)
-        return deep if components == 1 else deep.reshape(height, width, components)
-    pixels = np.add.accumulate(lines[:, 1:].reshape(height, width, components), axis=1, dtype=np.uint8)
+        pixels = np.ascontiguousarray(pixels).view(">u2").astype(np.uint16)
     return pixels[:, :, 0] if components == 1 else pixels
 
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 from viewsphere.engines.shared import blender as _blender
 from viewsphere.engines.shared.blender import PROGRAMS, stage
+from viewsphere.model.channel import ALL_PICTURES
 from viewsphere.plugins.engine import EngineSpec
 
 if TYPE_CHECKING:
@@ -20,4 +21,4 @@ def _check(options: Mapping[str, JsonValue]) -> None:
     _blender.check(options, "eevee")
 
 
-ENGINE = EngineSpec(check=_check, stage=stage, opens_scenes=True, catches_shadows=False, programs=PROGRAMS)
+ENGINE = EngineSpec(check=_check, stage=stage, opens_scenes=True, catches_shadows=False, programs=PROGRAMS, paints=ALL_PICTURES)

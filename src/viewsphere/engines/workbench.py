@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from viewsphere.engines.shared import blender as _blender
 from viewsphere.engines.shared.blender import PROGRAMS, stage
+from viewsphere.model.channel import ALL_PICTURES
 from viewsphere.plugins.engine import EngineSpec
 
 if TYPE_CHECKING:
@@ -18,4 +19,4 @@ def _check(options: Mapping[str, JsonValue]) -> None:
     _blender.check(options, "workbench")
 
 
-ENGINE = EngineSpec(check=_check, stage=stage, opens_scenes=True, catches_shadows=False, programs=PROGRAMS)
+ENGINE = EngineSpec(check=_check, stage=stage, opens_scenes=True, catches_shadows=False, programs=PROGRAMS, paints=ALL_PICTURES)

@@ -4,7 +4,8 @@
 
 Each file holds the gzipped arrays that `keys` names:
 
-    colors                               uint8 (H, W, 3); (H, W, 4) if only the picture without its background is stored
+    colors                               uint8 (H, W, 3); (H, W, 4) if only the picture without its background is stored;
+                                         uint16 of `rgb16`, float32 of `rgb_linear` if only these are
     depth, distance                      float32 (H, W), metres along the z axis and along the ray; 1e10 for the background
     normals                              float32 (H, W, 3), (n + 1) / 2 of camera axes x right, y up, z backwards; else 0.5
     nocs                                 float32 (H, W, 4), the place in the object's box; 1 on an object, else all 0
@@ -40,6 +41,7 @@ from viewsphere.formats.shared.writing.export_files import Coded
 from viewsphere.formats.shared.writing.paper import json_bytes
 from viewsphere.formats.shared.writing.refusals import sequences
 from viewsphere.formats.shared.writing.tree import File, Piece, Tree, functions
+from viewsphere.model.channel import ALL_PICTURES
 from viewsphere.model.fields.frozen import Frozen
 from viewsphere.model.sample import ObjectAnnotation, Sample
 from viewsphere.plugins.format import FormatSpec
@@ -185,6 +187,7 @@ FORMAT = FormatSpec(
     about=__doc__,
     holds=("pictures", "depth", "normals", "masks", "NOCS", "flow", "poses", "cameras"),
     read_by=("h5py", "BlenderProc"),
+    pictures=ALL_PICTURES,
     options=_Options,
     names_credits=False,
     needs=_needs,

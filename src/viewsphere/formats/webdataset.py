@@ -3,8 +3,9 @@
     <split>-000000.tar, <split>-000001.tar, ...
     <split>.json                                 the shards and their numbers of samples, as `wids` reads it; the categories
 
-A sample is a run of files of one key, `<index>`: its pictures as the store keeps them (`.rgb.png`), its other channels as
-arrays (`.depth.npy`), and all other data (`.json`). Equal samples make equal bytes: files have no date and no owner.
+A sample is a run of files of one key, `<index>`: its pictures as the store keeps them (`.rgb.png`), its other channels, also
+pictures of more than eight bits, as arrays (`.depth.npy`), and all other data (`.json`). Equal samples make equal bytes: files
+have no date and no owner.
 """
 
 from __future__ import annotations
@@ -24,7 +25,7 @@ from viewsphere.codecs import tar
 from viewsphere.files import open_file
 from viewsphere.formats.shared.writing.export_files import check_files
 from viewsphere.formats.shared.writing.paper import json_bytes
-from viewsphere.model.channel import PICTURES
+from viewsphere.model.channel import ALL_PICTURES, PICTURES
 from viewsphere.model.fields.frozen import Frozen
 from viewsphere.model.sample import Sample
 from viewsphere.plugins.format import FormatSpec, Remark
@@ -184,6 +185,7 @@ FORMAT = FormatSpec(
     about=__doc__,
     holds=("everything",),
     read_by=("webdataset", "wids"),
+    pictures=ALL_PICTURES,
     options=_Options,
     names_credits=False,
     writer=_writer,

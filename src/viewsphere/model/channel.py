@@ -51,6 +51,8 @@ PASSES: dict[str, Channel] = {
     for c in (
         Channel("rgb", np.uint8, 3, "sRGB", 0, "png", "colour picture"),
         Channel("rgba", np.uint8, 4, "sRGB", 0, "png", "colour picture without its background; straight alpha"),
+        Channel("rgb16", np.uint16, 3, "sRGB", 0, "png", "colour picture in 65,536 levels, without JPEG's traces"),
+        Channel("rgb_linear", np.float32, 3, "scene-linear", 0, "tiff", "light of the picture, before exposure and finish"),
         Channel("albedo", np.float32, 3, "1", 0, "tiff", "share of the light that the surface scatters to all sides"),
         Channel("shading", np.float32, 3, "scene-linear", 0, "tiff", "scattered light without the surface's colour"),
         Channel("residual", np.float32, 3, "scene-linear", 0, "tiff", "all other light: mirrored, let through, emitted, sky"),
@@ -62,7 +64,14 @@ PASSES: dict[str, Channel] = {
 """Channels that an engine paints; all others are labels. All but the pictures are arrays; docs/pictures.md describes them."""
 
 PICTURES = ("rgb", "rgba")
-"""The passes that are pictures, which every engine paints. The first that a data set keeps is its samples' picture."""
+"""The pictures of eight bits, which every engine paints."""
+
+DEEP_PICTURES = ("rgb16", "rgb_linear")
+"""The pictures of more than eight bits."""
+
+ALL_PICTURES = (*PICTURES, *DEEP_PICTURES)
+"""The passes that are pictures. The first that a data set keeps is its samples' picture."""
+
 
 LIGHT_PASSES = ("albedo", "shading", "residual", "emission")
 """Parts of a picture's light, sampled like the picture: albedo x shading + residual is the picture before exposure."""
@@ -75,9 +84,20 @@ DEFAULT_CHANNELS = ("rgb", "depth", "instances", "normals")
 
 def picture_of(kept: Container[str]) -> str | None:
     """The channel that serves as a sample's picture, None if none is kept."""
-    return next((name for name in PICTURES if name in kept), None)
+    return next((name for name in ALL_PICTURES if name in kept), None)
+
+
+def painted_together(names: Container[str]) -> tuple[tuple[str, ...], ...]:
+    """The pictures among the names, those of one light together: first all with the background, then `rgba`."""
+    groups = (("rgb", *DEEP_PICTURES), ("rgba",))
+    return tuple(wanted for group in groups if (wanted := tuple(name for name in group if name in names)))
+
+
+def lacks_background(names: Container[str]) -> bool:
+    """Return whether the first light of `painted_together` is that without background."""
+    return painted_together(names)[:1] == (("rgba",),)
 
 
 def missing(needed: Iterable[str], kept: Container[str]) -> tuple[str, ...]:
-    """The needed channels that are not kept; `rgba`, the picture without background, replaces `rgb`."""
+    """The needed channels that are not kept; any other picture replaces `rgb`."""
     return tuple(name for name in needed if name not in kept and not (name == "rgb" and picture_of(kept)))

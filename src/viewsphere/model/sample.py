@@ -15,6 +15,7 @@ from viewsphere.model.channel import picture_of
 from viewsphere.model.fields.notebook import Shown
 from viewsphere.model.instant import Viewpoint
 from viewsphere.model.model_spec import Size
+from viewsphere.model.scene import Finish
 from viewsphere.model.sensors.camera import Camera
 from viewsphere.model.sensors.rig import CAMERA
 from viewsphere.model.shot import Shot
@@ -227,6 +228,7 @@ class Sample(Shown):
         requested: Names of the labels of objects and of pictures that the recipe requests.
         extra: Fields of the labels of pictures.
         options: Options of labels, by their names.
+        finish: The steps from light to the picture; None if unknown, as for imported pictures.
     """
 
     index: int
@@ -247,6 +249,7 @@ class Sample(Shown):
     requested: tuple[str, ...] = ()  # labels of objects and of pictures that were asked for
     extra: Mapping[str, Any] = field(default_factory=dict[str, Any])  # fields of labels of pictures
     options: Mapping[str, Mapping[str, Any]] = field(default_factory=dict[str, Mapping[str, Any]])  # those of labels
+    finish: Finish | None = None
 
     def __repr__(self) -> str:
         size = f"{self.width} x {self.height} pixels"
@@ -287,11 +290,13 @@ class Sample(Shown):
         return self.image_size[1] if self.known_camera is None and self.image_size else self.camera.height
 
     @property
-    def picture(self) -> NDArray[np.uint8]:
+    def picture(self) -> NDArray[Any]:
         """The colours, (H, W, 3) uint8 sRGB, or (H, W, 4) if only the picture without its background is stored.
 
+        Data sets that store only a deeper picture return it as it is: uint16 sRGB, or float32 scene-linear.
+
         Raises:
-            AttributeError: Neither picture is stored.
+            AttributeError: No picture is stored.
         """
         return getattr(self, picture_of(self.channels) or "rgb")
 

@@ -13,7 +13,7 @@ from viewsphere.composing.viewpoints.pose_files.motions import nearest_rotation
 from viewsphere.errors import RecipeError
 from viewsphere.geometry.rotation import compose, rigid, transform
 from viewsphere.labels import Partner, label_named, requires
-from viewsphere.model.channel import PASSES
+from viewsphere.model.channel import PASSES, picture_of
 from viewsphere.model.scene import IDENTITY, Matrix4
 from viewsphere.model.sensors.camera import Intrinsics
 from viewsphere.model.sensors.lidar import LIDAR, Lidar
@@ -112,7 +112,7 @@ def _lens(name: str, entry: SensorEntry, camera: CameraEntry, lens: Intrinsics) 
 
 def _channels(recipe: Recipe, name: str, entry: SensorEntry) -> tuple[str, ...] | None:
     for i, channel in enumerate(entry.channels or ()):
-        kept = "rgba" if channel == "rgb" and "rgba" in recipe.channels else channel
+        kept = _kept(recipe, channel)
         if kept not in recipe.channels:
             raise RecipeError(
                 f"rig.sensors.{name}.channels[{i}]: {one_of(channel, recipe.channels)}, or add it to the recipe's "
@@ -122,8 +122,15 @@ def _channels(recipe: Recipe, name: str, entry: SensorEntry) -> tuple[str, ...] 
             raise RecipeError(f"rig.sensors.{name}.channels[{i}]: {wrong}: leave it out")
     if entry.channels is None:
         return None
-    channels_of_sensor = {"rgba" if channel == "rgb" and "rgba" in recipe.channels else channel for channel in entry.channels}
+    channels_of_sensor = {_kept(recipe, channel) for channel in entry.channels}
     return tuple(channel for channel in recipe.channels if channel in channels_of_sensor)
+
+
+def _kept(recipe: Recipe, channel: str) -> str:
+    """The name under which a recipe keeps a channel: its background or its files may replace `rgb` by another picture."""
+    if channel != "rgb" or ("rgb" in recipe.channels and "rgba" not in recipe.channels):
+        return channel
+    return "rgba" if "rgba" in recipe.channels else picture_of(recipe.channels) or channel
 
 
 def _not_measured(channel: str, entry: SensorEntry) -> str | None:

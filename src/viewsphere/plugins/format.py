@@ -8,6 +8,7 @@ from typing import Annotated, Any, ClassVar
 
 from pydantic import Field
 
+from viewsphere.model.channel import PICTURES
 from viewsphere.plugins.registry import Kind
 from viewsphere.plugins.spec import SpecWithOptions
 from viewsphere.validation.specs import Takes
@@ -32,6 +33,11 @@ class FormatSpec(SpecWithOptions):
         default=None,
         description="names of all labels and passes that it reads, besides pictures that happen to be there; None: all that "
         "are kept. A run that does not keep one of them is refused before it begins; an export computes those that are labels",
+    )
+    pictures: tuple[str, ...] = Field(
+        default=PICTURES,
+        description="kinds of picture that it holds: `rgb` and `rgba` have eight bits, `rgb16` sixteen, `rgb_linear` is light. "
+        "A format that needs `rgb` refuses a data set whose picture is of another kind",
     )
     needs: Annotated[Callable[..., Sequence[str]] | None, Takes(0)] = Field(
         default=None, description="names of further labels and passes that its options require"

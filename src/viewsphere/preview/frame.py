@@ -10,7 +10,8 @@ from PIL import Image, ImageDraw
 
 from viewsphere.errors import StoreError
 from viewsphere.labels import Drawing, Extent, channels, drawable, is_in, stand_in_for
-from viewsphere.model.channel import picture_of
+from viewsphere.labels.shared.drawing.passes import shown_picture
+from viewsphere.model.channel import ALL_PICTURES, picture_of
 from viewsphere.model.sample import Sample
 from viewsphere.validation.errors import one_of
 
@@ -105,9 +106,10 @@ def _pictures(sample: Sample, draw: Sequence[str], width: int | None, before: Be
         if (stand_in := stand_in_for(sample.channels)) is not None:
             return [stand_in(sample, width or SIZE)]
         raise StoreError(
-            "preview: expected pictures (rgb or rgba), found a data set that keeps neither: preview its recipe instead"
+            f"preview: expected pictures ({', '.join(ALL_PICTURES)}), found a data set that keeps none: preview its recipe "
+            "instead"
         )
-    rgb = _on_paper(sample.picture)
+    rgb = _on_paper(shown_picture(sample))
     for drawing in chosen:
         rgb = drawing.pixels(rgb, sample) if drawing.pixels else rgb
     scale = 1.0 if width is None else min(1.0, width / rgb.shape[1])

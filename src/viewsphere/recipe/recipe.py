@@ -281,6 +281,14 @@ class Recipe(Shown, Frozen):
             return value
         return tuple(dict.fromkeys("rgba" if name == "rgb" else name for name in value))
 
+    @model_validator(mode="after")
+    def _as_stored(self) -> Self:
+        """The recipe, with the picture that its kind of file holds; a picture that is listed itself stays beside `rgb`."""
+        deep = self.files.deep
+        if deep is not None and deep not in self.channels:
+            object.__setattr__(self, "channels", tuple(deep if name == "rgb" else name for name in self.channels))
+        return self
+
     @field_validator("scene")
     @classmethod
     def _drawn_when(cls, value: SceneEntry, info: ValidationInfo) -> SceneEntry:

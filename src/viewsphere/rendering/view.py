@@ -88,6 +88,38 @@ def to_bytes(picture: Float32) -> Bytes:
     return out
 
 
+def to_words(picture: Float32) -> NDArray[np.uint16]:
+    """sRGB levels of a display-linear picture (H, W, 3), 0 to 65535: within half a level, and never by way of eight bits."""
+    place = np.clip(picture, 0, 1) * np.float32(65535)
+    low = np.minimum(place.astype(np.int32), 65534)
+    curve = _srgb_curve()
+    return np.rint((curve[low] + (curve[low + 1] - curve[low]) * (place - low)) * 65535).astype(np.uint16)
+
+
+def bytes_of_words(picture: NDArray[np.uint16]) -> Bytes:
+    """A picture of 65,536 levels in 256, rounded."""
+    return ((picture.astype(np.uint32) + 128) // 257).astype(np.uint8)
+
+
+def scene_linear(radiance: Float32, background: Float32 | None, view: ViewTransform) -> Float32:
+    """The light of a picture before exposure, (H, W, 3) float32, 0 or more; arguments as for `develop`.
+
+    A background, which is shown exactly, has the light that the transform `raw` would show as the background's colours.
+    """
+    light = radiance[..., :3]
+    if background is not None:
+        inverse = np.linalg.inv(_exposure_matrix(view).astype(np.float64))
+        under = (_rows(background) @ inverse.T).astype(np.float32)
+        under = under if len(under) == 1 else under.reshape(light.shape)
+        light = light + (1 - radiance[..., 3:]) * under
+    return np.maximum(np.ascontiguousarray(light), np.float32(0))
+
+
+def picture_of_light(light: Float32, view: ViewTransform) -> Bytes:
+    """The picture (H, W, 3) uint8 of scene-linear light (H, W, 3), without smoother and effects."""
+    return develop(np.dstack([light, np.ones(light.shape[:2], np.float32)]), None, view)
+
+
 def _exposure_matrix(view: ViewTransform) -> Float32:
     """White balance and exposure in one matrix, (3, 3) float32: scene-linear to exposed light."""
     return (white_balance(view.temperature_k, view.tint) * (EXPOSURE * 2.0**view.exposure)).astype(np.float32)
@@ -150,3 +182,9 @@ def _rows(picture: NDArray[Any] | None) -> NDArray[Any]:
 def srgb_bytes() -> Bytes:
     """The sRGB bytes (IEC 61966-2-1) of 65,536 linear values from 0 to 1, fine enough for every byte to have a value."""
     return np.round(encoded(np.arange(65536) / 65535) * 255).astype(np.uint8)
+
+
+@cache
+def _srgb_curve() -> NDArray[np.float64]:
+    """The sRGB values (IEC 61966-2-1) of 65,536 linear values from 0 to 1; lines between them are within 0.005 / 65535."""
+    return encoded(np.arange(65536) / 65535)

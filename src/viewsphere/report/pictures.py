@@ -23,7 +23,7 @@ from viewsphere.labels.shared.drawing.depth_colors import extent as depth_extent
 from viewsphere.labels.shared.drawing.depth_colors import nearness
 from viewsphere.labels.shared.drawing.flow_colors import longest_of
 from viewsphere.labels.shared.drawing.flow_colors import picture as flow_colors
-from viewsphere.labels.shared.drawing.passes import DRAWINGS
+from viewsphere.labels.shared.drawing.passes import DRAWINGS, shown_picture
 from viewsphere.labels.shared.drawing.passes import picture as pass_colors
 from viewsphere.model.channel import picture_of
 from viewsphere.model.sample import ObjectAnnotation, Sample
@@ -161,7 +161,8 @@ def layer_names(sample: Sample) -> list[str]:
     if stand_in_for(sample.channels) is not None:
         return ["rgb"]
     drawable = ({*PAINTERS} - {"rgb", "coordinates"}) & {*sample.channels}
-    drawable |= {"rgb"} if picture_of(sample.channels) else set()
+    picture = picture_of(sample.channels)
+    drawable = (drawable - {picture}) | {"rgb"} if picture else drawable
     drawable |= {"coordinates"} if {"coordinates", "instances"} <= {*sample.channels} else set()
     return [name for name in PAINTERS if name in drawable]
 
@@ -172,9 +173,7 @@ def layer(sample: Sample, name: str, scale: Scale, within: Mapping[str, Extent] 
 
 
 def _rgb(sample: Sample, scale: Scale, within: Mapping[str, Extent]) -> _Layer:
-    picture = (
-        _shrunk(np.asarray(sample.picture, np.uint8), scale) if picture_of(sample.channels) else scan_picture(sample, scale)
-    )
+    picture = _shrunk(shown_picture(sample), scale) if picture_of(sample.channels) else scan_picture(sample, scale)
     return _Layer(_webp(picture, scale.quality, method=1 if scale.quick else 4))
 
 

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from viewsphere.check.frames.pictures import pictures
 from viewsphere.errors import ViewsphereError
 from viewsphere.geometry.camera import orbit_center, orbit_rotation
 from viewsphere.labels import channels
@@ -26,22 +27,28 @@ SHARE_TOLERANCE = 1e-4
 
 def files(sample: Sample) -> Iterator[str]:
     """Every channel's file belongs to the frame, exists, and contains an array of the image's size; passes have
-    valid values.
+    valid values, and pictures of different depths agree.
     """
-    height, width = sample.height, sample.width
+    is_whole, height, width = True, sample.height, sample.width
     for name, file in sample.files.items():
         if file.split("/")[-2:] != [name, f"{sample.index:08d}{PurePosixPath(file).suffix}"]:
             yield f"{name}: expected the file of frame {sample.index}, found {file}"
         try:
             array = sample.channels[name]
         except ViewsphereError as error:
+            is_whole = False
             yield str(error)
             continue
         channel = channels()[name]
         if not channel.fits(array, height, width):
+            is_whole = False
             yield f"{file}: expected {channel.expected(height, width)}, found {array.shape} {array.dtype}"
         elif name in PASSES and name not in PICTURES:
-            yield from _passes(sample, name, array)
+            wrong = list(_passes(sample, name, array))
+            is_whole = is_whole and not wrong
+            yield from wrong
+    if is_whole:
+        yield from pictures(sample)
 
 
 def _passes(sample: Sample, name: str, array: NDArray[Any]) -> Iterator[str]:

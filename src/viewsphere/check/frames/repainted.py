@@ -102,6 +102,6 @@ def _compared(name: str, painted: NDArray[Any], sample: Sample, files: Files, to
 def _beyond(found: NDArray[Any], wanted: NDArray[Any], is_lossy: bool) -> NDArray[np.bool_]:
     """A mask (H, W): True where any component differs by more than another processor allows."""
     if np.issubdtype(found.dtype, np.integer):
-        most = LOSSY_STEPS if is_lossy else STEP
+        most = LOSSY_STEPS if is_lossy else SHARE * np.iinfo(found.dtype).max if found.dtype == np.uint16 else STEP
         return unequal(np.abs(found.astype(np.int64) - wanted) > most, np.zeros(found.shape, np.bool_))
     return unequal(np.isclose(found, wanted, rtol=SHARE, atol=SHARE, equal_nan=True), np.ones(found.shape, np.bool_))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from typing import Any
@@ -25,13 +25,13 @@ from viewsphere.engines.raster.shadows.thing_occlusion import TargetShades
 from viewsphere.engines.shared.arranged import Arranged, Arrangements
 from viewsphere.engines.shared.passes import shading_of
 from viewsphere.errors import RecipeError
-from viewsphere.model.channel import LIGHT_PASSES, MATERIAL_PASSES, PICTURES, picture_of
+from viewsphere.model.channel import LIGHT_PASSES, MATERIAL_PASSES, lacks_background, painted_together
 from viewsphere.model.listed import LARGEST_PICTURE
 from viewsphere.model.sensors.camera import Camera
 from viewsphere.model.shot import Shot
 from viewsphere.model.weather import Wet
 from viewsphere.rendering.background import display_background, shows_sky
-from viewsphere.rendering.finish import finished
+from viewsphere.rendering.finish import pictures
 from viewsphere.rendering.seen import seen_by
 from viewsphere.rendering.weather.falling import fall_in
 from viewsphere.truth.raster.geometry import Geometry
@@ -94,25 +94,26 @@ class RasterStage:
         painted: dict[str, NDArray[Any]] = {}
         if not set(names).isdisjoint(LIGHT_PASSES):
             painted |= self._light(instant, sensor, visibility, names)
-            picture = picture_of(names)
+            together = painted_together(names)
             if (
-                picture
+                together
                 and not self.shot.scene.weather
                 and Blur(self.arrangements, instant, sensor).count(self.at(instant), visibility) == 1
             ):
                 camera = self.shot.camera(instant, sensor)
-                painted[picture] = self._finished(instant, camera, visibility, picture)  # from the light that was split
+                painted |= self._finished(instant, camera, visibility, together[0])  # from the light that was split
         if not set(names).isdisjoint(MATERIAL_PASSES):
             made = materials(self.baked(instant), self.shot.camera(instant, sensor), visibility)
             painted |= dict(zip(MATERIAL_PASSES, made.T.reshape(2, *visibility.triangle.shape).copy(), strict=True))
-        left = [name for name in PICTURES if name in names and name not in painted]
-        painted |= {name: self._picture(instant, sensor, visibility, name) for name in left}
+        for wanted in painted_together(names):
+            if wanted[0] not in painted:
+                painted |= self._pictures(instant, sensor, visibility, wanted)
         return {name: painted[name] for name in names}
 
     def _light(self, instant: int, sensor: int, visibility: Visibility, names: Collection[str]) -> dict[str, Float32]:
         """Return all `LIGHT_PASSES`, with the sky if the picture has it; (H, W, 3) each."""
         camera, is_lit = self.shot.camera(instant, sensor), "shading" in names or "residual" in names
-        finish = self.shot.finish(instant).with_background(picture_of(names) == "rgba")
+        finish = self.shot.finish(instant).with_background(lacks_background(names))
         has_sky = shows_sky(finish.background)
         radiance = self._canvas(camera.width * camera.height)
         split = np.zeros((len(radiance), 9 if is_lit else 6), np.float32)
@@ -131,27 +132,27 @@ class RasterStage:
         residual = np.maximum(radiance[:, :3].reshape(shape) - albedo * shading, np.float32(0))
         return {"albedo": albedo, "shading": shading, "residual": residual, "emission": emission}
 
-    def _picture(self, instant: int, sensor: int, visibility: Visibility, name: str) -> NDArray[np.uint8]:
-        """`rgb` or `rgba`."""
+    def _pictures(self, instant: int, sensor: int, visibility: Visibility, names: Sequence[str]) -> dict[str, NDArray[Any]]:
+        """Pictures of one light: `rgba`, or any of the others."""
         camera, background = (
             self.shot.camera(instant, sensor),
-            self.shot.finish(instant).with_background(name == "rgba").background,
+            self.shot.finish(instant).with_background("rgba" in names).background,
         )
         radiance = self._canvas(camera.width * camera.height)
         self._paint(instant, sensor, camera, visibility, shows_sky(background), radiance)
         picture, seconds = radiance.reshape(camera.height, camera.width, 4), self.shot.instants[instant].seconds
         fall_in(self.shot.scene, picture, camera, seconds, visibility.inverse_depth)
-        return self._finished(instant, camera, visibility, name)
+        return self._finished(instant, camera, visibility, names)
 
-    def _finished(self, instant: int, camera: Camera, visibility: Visibility, name: str) -> NDArray[np.uint8]:
-        """`rgb` or `rgba`, made from the light that was painted last."""
-        finish = self.shot.finish(instant).with_background(name == "rgba")
+    def _finished(self, instant: int, camera: Camera, visibility: Visibility, names: Sequence[str]) -> dict[str, NDArray[Any]]:
+        """Pictures made from the light that was painted last: `rgba`, or any of the others."""
+        finish = self.shot.finish(instant).with_background("rgba" in names)
         background = display_background(finish.background, camera.width, camera.height)
         radiance = self._canvas(camera.width * camera.height)
         shape, focus = (camera.height, camera.width, 4), np.array(self.shot.instants[instant].focus)
         owner = self.at(instant).triangle_object
         seen = partial(seen_by, camera, focus, visibility.inverse_depth, visibility.triangle, owner)
-        return finished(radiance.reshape(shape), background, finish, seen)
+        return pictures(names, radiance.reshape(shape), background, finish, seen)
 
     def _paint(
         self, instant: int, sensor: int, camera: Camera, visibility: Visibility, has_sky: bool, radiance: Float32

@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING
 
 from viewsphere.formats import Scope
 from viewsphere.formats.shared.writing.refusals import any_view
+from viewsphere.model.channel import ALL_PICTURES
 from viewsphere.plugins.format import FormatSpec, Remark
 
 if TYPE_CHECKING:
@@ -70,6 +71,7 @@ FORMAT = FormatSpec(
     holds=("poses", "3D boxes", "masks", "depth"),
     read_by=("any JSON reader",),
     panoramas=True,
+    pictures=ALL_PICTURES,
     refuses=_refuses,
     writer=_writer,
     preparer=_preparer,

@@ -2,7 +2,7 @@
 synthetic scenes.
 
     <world>/transforms.json                  lenses, poses and files of all pictures; for nerfstudio the names of each split
-    <world>/images/<sensor>/<index>.png      the pictures; without <sensor> if there is one
+    <world>/images/<sensor>/<index>.png      the pictures (.exr of light); without <sensor> if there is one
     <world>/depths/<sensor>/<index>.png      depth along z, 16 bits, millimetres; 0 for the background and beyond 65.5 m
     <world>/masks/<sensor>/<index>.png       with `masks`: 255 on objects, 0 for pixels that training leaves out
     <world>/points.ply                       coloured points, pixels of a coarse grid, to initialise splatting
@@ -21,7 +21,8 @@ the splits train, val and test, so a missing split repeats the world's first spl
 Lenses are pinholes, OpenCV's with k1 k2 p1 p2 (for nerfstudio also k3), and its fisheye. NeRF's synthetic scenes have a centred
 pinhole, equal in all pictures of a world. `kind: instant-ngp` calls depth `depth_path` and has `aabb_scale` 16; set it to the
 size of your scene. The file also gives the first lens for all pictures, because nerfstudio's reader of instant-ngp's files
-supports one lens. Skew is not supported. `import` reads the folder of one world, or one of its files.
+supports one lens. Data sets whose picture is scene-linear light (`files: {rgb: exr}`) export it as EXR for `kind: instant-ngp`,
+which alone reads it. Skew is not supported. `import` reads the folder of one world, or one of its files.
 
 Not verified by running these programs, but read in their code: all of the above. Not verified at all: instant-ngp's depth along
 z. Sources: https://docs.nerf.studio/quickstart/data_conventions.html; https://github.com/NVlabs/instant-ngp; Mildenhall et al.,
@@ -50,8 +51,9 @@ from viewsphere.formats.shared.reading.image_lists import MISTAKES, one_line
 from viewsphere.formats.shared.reading.posed_pictures import camera_of, picture_inside
 from viewsphere.formats.shared.writing import refusals
 from viewsphere.formats.shared.writing.export_files import Coded
-from viewsphere.formats.shared.writing.pictures import picture, suffix_of
+from viewsphere.formats.shared.writing.pictures import light_exr, picture, suffix_of
 from viewsphere.formats.shared.writing.tree import File, Layout, Piece, Tree, functions, item
+from viewsphere.model.channel import PICTURES, picture_of
 from viewsphere.model.fields.frozen import Frozen
 from viewsphere.model.listed import ListedShot
 from viewsphere.model.sample import Sample
@@ -122,6 +124,8 @@ def _refuses(scope: Scope, options: _Options) -> Iterator[str]:
     """Reasons to refuse: unknown cameras, and lenses that the files cannot express."""
     if options.masks and options.kind != "nerfstudio":
         yield f"expected masks with kind nerfstudio; found {options.kind}"
+    if options.kind != "instant-ngp" and picture_of(scope.channels) == "rgb_linear":
+        yield "expected kind: instant-ngp for pictures of scene-linear light, or rgb in channels; found kind: " + options.kind
     yield from refusals.lacking_labels(scope, _needs(options))
     yield from refusals.known_cameras(scope)
     cameras = dict(refusals.lenses(scope))
@@ -150,8 +154,9 @@ class _Nerfstudio(Tree):
         if self._kind == SYNTHETIC:
             yield from synthetic_files(sample, world, stem)
             return
-        name = f"images/{stem}{suffix_of(sample, '.png', '.jpg')}"
-        yield File(f"{world}/{name}", picture(sample, ".png", ".jpg"))
+        is_light = picture_of(sample.channels) == "rgb_linear"
+        name = f"images/{stem}{'.exr' if is_light else suffix_of(sample, '.png', '.jpg')}"
+        yield File(f"{world}/{name}", light_exr(sample) if is_light else picture(sample, ".png", ".jpg"))
         yield File(f"{world}/depths/{stem}.png", measured_png(sample, MILLIMETRE))
         depth = "depth_path" if self._kind == "instant-ngp" else "depth_file_path"
         entry = {"file_path": name, depth: f"depths/{stem}.png", **_said_of(lens, self._kind)}
@@ -206,6 +211,7 @@ preparer, writer, verify = functions(_Nerfstudio)
 FORMAT = FormatSpec(
     about=__doc__,
     holds=("cameras", "poses", "depth", "masks", "points"),
+    pictures=(*PICTURES, "rgb_linear"),
     read_by=("nerfstudio", "instant-ngp", "NeRF", "Gaussian splatting"),
     options=_Options,
     channels=("rgb",),

@@ -13,6 +13,7 @@ from viewsphere.codecs.png_tiff import encode_png
 from viewsphere.formats.shared.writing.export_files import Coded
 from viewsphere.geometry.camera import pixel_rays
 from viewsphere.geometry.rotation import transform
+from viewsphere.labels.shared.drawing.passes import shown_picture
 from viewsphere.model.sample import Sample
 from viewsphere.model.sensors.camera import Camera, Intrinsics
 from viewsphere.model.sensors.rig import CAMERA, Rig
@@ -142,4 +143,4 @@ def points_of(sample: Sample) -> _Points:
     rows, columns, rays, depth = rows[seen], columns[seen], rays[seen], depth[seen]
     places = rays * (depth / rays[:, 2])[:, None]
     pixels = np.column_stack((columns, rows)) + 0.5
-    return _Points(pixels, transform(camera.R.T, places - camera.t), sample.picture[rows, columns, :3])
+    return _Points(pixels, transform(camera.R.T, places - camera.t), shown_picture(sample)[rows, columns, :3])

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from viewsphere.errors import UserError
 from viewsphere.geometry.camera import pixel_rays
 from viewsphere.geometry.rotation import transform
-from viewsphere.model.channel import picture_of
+from viewsphere.model.channel import PICTURES
 from viewsphere.model.sensors.camera import Camera
 from viewsphere.validation.errors import one_of
 
@@ -82,7 +82,7 @@ def _visible(channels: Channels, camera: Camera, categories: Mapping[int, int]) 
         with np.errstate(divide="ignore"):
             lengths = _needed(channels, "depth").astype(np.float64) / rays[..., 2]
     seen = np.isfinite(lengths) & np.isfinite(rays).all(axis=-1)
-    picture = picture_of(channels)
+    picture = next((name for name in PICTURES if name in channels), None)
     return PointCloud(
         "camera",
         rays[seen] * lengths[seen][:, None],

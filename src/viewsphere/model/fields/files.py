@@ -10,16 +10,22 @@ from viewsphere.model.channel import Channel
 from viewsphere.model.fields.frozen import Frozen
 from viewsphere.model.fields.numbers import Count, Positive
 
-Encoding = Literal["png", "png8", "png16", "jpeg", "webp", "qoi", "jxl", "tiff", "exr", "npz"]
+Encoding = Literal["png", "png8", "png16", "jpeg", "webp", "qoi", "jxl", "tiff", "exr", "half", "hdr", "npz"]
 
 SUFFIXES: dict[Encoding, str] = {
     **{"png": ".png", "png8": ".png", "png16": ".png", "jpeg": ".jpg", "webp": ".webp", "qoi": ".qoi", "jxl": ".jxl"},
-    **{"tiff": ".tiff", "exr": ".exr", "npz": ".npz"},
+    **{"tiff": ".tiff", "exr": ".exr", "half": ".exr", "hdr": ".hdr", "npz": ".npz"},
 }
 """File name endings, with their dots."""
 
 LOSSY = ("jpeg", "webp", "jxl")
 """Encodings that take a quality; without a quality all but JPEG are lossless."""
+
+DEEP: dict[str, str] = {"png16": "rgb16", "exr": "rgb_linear", "exr32": "rgb_linear", "hdr": "rgb_linear"}
+"""The channel that replaces `rgb` for each kind of picture file of more than eight bits."""
+
+LIGHT: dict[str, Encoding] = {"exr": "half", "exr32": "exr", "hdr": "hdr"}
+"""The encoding of scene-linear light for each kind of picture file."""
 
 STEP = 0.001
 """Default depth of a step of 16-bit files, metres: 1 mm, up to 65.5 m."""
@@ -31,8 +37,10 @@ class Files(Frozen):
     Labels are exact in every format except `depth: png16`, which rounds.
     """
 
-    rgb: Literal["png", "jpeg", "webp", "qoi", "jxl"] = Field(
-        default="png", description="file of the picture; qoi and jxl (JPEG XL) need the extra codecs"
+    rgb: Literal["png", "jpeg", "webp", "qoi", "jxl", "png16", "exr", "exr32", "hdr"] = Field(
+        default="png",
+        description="file of the picture; qoi and jxl (JPEG XL) need the extra codecs; with png16 the channel rgb becomes "
+        "rgb16, with exr (half floats), exr32 or hdr it becomes rgb_linear, unless channels list these as well",
     )
     rgba: Literal["png", "webp", "qoi", "jxl"] = Field(default="png", description="file of the picture with alpha")
     quality: Annotated[Count, Field(le=100)] | None = Field(
@@ -68,6 +76,11 @@ class Files(Frozen):
         return self
 
     @property
+    def deep(self) -> str | None:
+        """The channel of more than eight bits that the kind of picture file holds; None for files of eight bits."""
+        return DEEP.get(self.rgb)
+
+    @property
     def step(self) -> float:
         """Metres in one step of a 16-bit PNG of depth."""
         return self.depth_unit or STEP
@@ -76,7 +89,9 @@ class Files(Frozen):
         """The encoding that this channel is written in."""
         match channel.name, channel.encoding:
             case "rgb", _:
-                return self.rgb
+                return "png" if self.rgb in ("png16", "exr", "exr32", "hdr") else self.rgb
+            case "rgb_linear", _:
+                return LIGHT.get(self.rgb, self.geometry)
             case "rgba", _:
                 return self.rgba
             case _ if channel.in_steps:

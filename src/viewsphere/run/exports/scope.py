@@ -12,7 +12,7 @@ from viewsphere.errors import UserError
 from viewsphere.formats import Scope
 from viewsphere.formats.shared.writing.refusals import depth_lenses, lacking_labels
 from viewsphere.labels import label_named, label_names
-from viewsphere.model.channel import PASSES, missing
+from viewsphere.model.channel import PASSES, missing, picture_of
 from viewsphere.model.sample import Sample
 from viewsphere.planning.plan import Plan
 from viewsphere.plugins.format import FormatSpec
@@ -120,10 +120,22 @@ def refusals(spec: FormatSpec, entry: FormatEntry, scope: Scope) -> Iterator[str
 
 def not_held(spec: FormatSpec, entry: FormatEntry, scope: Scope) -> Iterator[str]:
     """Yield the same reasons except for a LiDAR's frames, which a planned run checks by its sensors' channels."""
+    yield from _too_deep(spec, entry, scope)
     if not spec.panoramas:
         yield from depth_lenses(scope)
     if spec.refuses is not None:
         yield from spec.refuses(scope, *entry.arguments())
+
+
+def _too_deep(spec: FormatSpec, entry: FormatEntry, scope: Scope) -> Iterator[str]:
+    """Yield the reason why a format cannot hold pictures of more than eight bits."""
+    picture = picture_of(scope.channels)
+    takes_pictures = spec.channels is None or "rgb" in needs_of(spec, entry)
+    if takes_pictures and picture is not None and picture not in spec.pictures:
+        yield (
+            f"expected pictures of eight bits, as its readers read no others; found {picture}: add rgb to channels, beside "
+            f"{picture}, or leave {entry.name} out of formats"
+        )
 
 
 def _pointless(spec: FormatSpec, entry: FormatEntry, scope: Scope) -> Iterator[str]:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from viewsphere.codecs.palette import MOST_COLORS, palette
 from viewsphere.errors import MissingExtraError, RemoteError, StoreError, UserError
 from viewsphere.files import read_bytes
-from viewsphere.model.channel import Channel
+from viewsphere.model.channel import DEEP_PICTURES, PICTURES, Channel
 from viewsphere.model.fields.files import Files
 
 MOST_STEPS = 65535
@@ -25,7 +25,7 @@ def encode(channel: Channel, array: NDArray[Any], files: Files | None = None) ->
     Raises ValueError for an array of another shape or dtype than the channel's, StoreError for ids above 65535,
     MissingExtraError if a codec is not installed. Ids above 255 do not fit a palette: such a frame's map is a 16-bit PNG.
     """
-    from viewsphere.codecs import exr, npz, pictures, png_tiff
+    from viewsphere.codecs import exr, hdr, npz, pictures, png_tiff
 
     files = files or Files()
     height, width = (*array.shape, 1)[:2]
@@ -36,6 +36,10 @@ def encode(channel: Channel, array: NDArray[Any], files: Files | None = None) ->
             return png_tiff.encode_tiff(array)
         case "exr":
             return exr.encode_exr(array)
+        case "half":
+            return exr.encode_exr(exr.half_floats(array))
+        case "hdr":
+            return hdr.encode_hdr(array)
         case "npz":
             return npz.encode_npz(array, channel.name)
         case "png":
@@ -92,7 +96,8 @@ def decode(channel: Channel, file: Path, read: Callable[[], bytes] | None = None
     try:
         array = _decoded(channel, read() if read else read_bytes(file, "MAX_PICTURE_BYTES"))
         is_rows = channel.components == 0 and array.dtype != channel.dtype
-        if is_rows or np.issubdtype(channel.dtype, np.floating) != np.issubdtype(array.dtype, np.floating):
+        is_deep = channel.name in DEEP_PICTURES and array.dtype == np.uint8
+        if is_rows or is_deep or np.issubdtype(channel.dtype, np.floating) != np.issubdtype(array.dtype, np.floating):
             raise UserError(f"expected {np.dtype(channel.dtype)}, found {array.dtype}")
     except MissingExtraError as error:
         raise MissingExtraError(f"{file}: {error}") from None
@@ -109,9 +114,9 @@ def decode(channel: Channel, file: Path, read: Callable[[], bytes] | None = None
 
 def _decoded(channel: Channel, data: bytes) -> NDArray[Any]:
     """The array in a file's bytes; the first bytes identify the kind of file."""
-    from viewsphere.codecs import exr, npz, pictures, png_tiff
+    from viewsphere.codecs import exr, hdr, npz, pictures, png_tiff
 
-    if channel.name in {"rgb", "rgba"}:
+    if channel.name in PICTURES:
         if _is_own_png(data, channel.components):
             with suppress(UserError):
                 return png_tiff.decode_png(data)
@@ -121,6 +126,8 @@ def _decoded(channel: Channel, data: bytes) -> NDArray[Any]:
     match data[:4]:
         case b"\x76\x2f\x31\x01":
             return exr.decode_exr(data)
+        case b"#?RA":
+            return hdr.decode_hdr(data)
         case b"PK\x03\x04":
             return npz.decode_npz(data, channel.name)
         case b"\x89PNG" if channel.in_steps:

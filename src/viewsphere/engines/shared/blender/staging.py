@@ -27,12 +27,12 @@ from viewsphere.engines.shared.blender.scripts import script_request
 from viewsphere.engines.shared.blender.texels import Kind, Levels
 from viewsphere.engines.shared.passes import shading_of
 from viewsphere.errors import BlenderDied, BlenderError, ModelError, RecipeError, UserError
-from viewsphere.model.channel import LIGHT_PASSES, MATERIAL_PASSES, PICTURES, picture_of
+from viewsphere.model.channel import LIGHT_PASSES, MATERIAL_PASSES, lacks_background, painted_together
 from viewsphere.model.sensors.camera import Camera
 from viewsphere.model.shot import Shot
 from viewsphere.model.thing import Thing
 from viewsphere.rendering.background import display_background, shows_sky
-from viewsphere.rendering.finish import finished
+from viewsphere.rendering.finish import pictures
 from viewsphere.rendering.seen import seen_by
 from viewsphere.rendering.weather.falling import fall_in
 from viewsphere.truth.raster.geometry import Geometry
@@ -202,13 +202,12 @@ class CyclesStage:
         """
         sweeping, painted = Sweeping(self.shot, instant, sensor), dict[str, NDArray[Any]]()
         is_lit = not set(names).isdisjoint(LIGHT_PASSES)
-        for name in PICTURES:
-            if name in names:
-                wanted = ("light",) if is_lit and "light" not in painted and sweeping.is_still else ()
-                painted |= self._picture(instant, sensor, visibility, name, wanted)
+        for group in painted_together(names):
+            wanted = ("light",) if is_lit and "light" not in painted and sweeping.is_still else ()
+            painted |= self._pictures(instant, sensor, visibility, group, wanted)
         if is_lit:
             if "light" not in painted:
-                background = self.shot.finish(instant).with_background(picture_of(names) == "rgba").background
+                background = self.shot.finish(instant).with_background(lacks_background(names)).background
                 camera, is_open = self.shot.camera(instant, sensor), not shows_sky(background)
                 painted |= self.arrangement(instant).rendered(camera, is_open, wanted=("light",))
             painted |= self._light(instant, sensor, visibility, painted["light"])
@@ -216,12 +215,12 @@ class CyclesStage:
             painted |= self._materials(instant, sensor, visibility)
         return {name: painted[name] for name in names}
 
-    def _picture(
-        self, instant: int, sensor: int, visibility: Visibility, name: str, wanted: Sequence[str]
+    def _pictures(
+        self, instant: int, sensor: int, visibility: Visibility, names: Sequence[str], wanted: Sequence[str]
     ) -> dict[str, NDArray[Any]]:
-        """`rgb` or `rgba`, and the other wanted results of its render (see `COMPONENTS`)."""
+        """Pictures of one light, `rgba` or any of the others, and the other wanted results of its render (see `COMPONENTS`)."""
         camera, arranged = self.shot.camera(instant, sensor), self.arrangement(instant)
-        finish = self.shot.finish(instant).with_background(name == "rgba")
+        finish = self.shot.finish(instant).with_background("rgba" in names)
         background = display_background(finish.background, camera.width, camera.height)
         is_open = not shows_sky(finish.background)
         fog = self.shot.scene.fog or self.shot.scene.fog_outdoors
@@ -235,7 +234,7 @@ class CyclesStage:
         fall_in(self.shot.scene, rendered["picture"], camera, seconds, visibility.inverse_depth)
         focus, owner = np.array(self.shot.instants[instant].focus), arranged.geometry.triangle_object
         seen = partial(seen_by, camera, focus, visibility.inverse_depth, visibility.triangle, owner)
-        return rendered | {name: finished(rendered["picture"], background, finish, seen)}
+        return rendered | pictures(names, rendered["picture"], background, finish, seen)
 
     def _light(self, instant: int, sensor: int, visibility: Visibility, light: Float32) -> dict[str, Float32]:
         """Return all `LIGHT_PASSES` of the rendered light, without shadow catchers, which Cycles counts in the albedo."""

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from viewsphere.codecs.exr import encode_exr, half_floats
 from viewsphere.codecs.pictures import encode_picture
 from viewsphere.codecs.png_tiff import encode_png
 from viewsphere.formats.shared.writing.export_files import Coded, Content
@@ -42,6 +43,14 @@ def picture(sample: Sample, *suffixes: str) -> Content:
         return encode_png(pixels) if kind == ".png" else encode_picture(pixels, "jpeg", JPEG_QUALITY)
 
     return Coded(sample.index, f"picture{kind}", make)
+
+
+def light_exr(sample: Sample) -> Content:
+    """A sample's scene-linear light as OpenEXR: the stored file if it is one, otherwise a new one of half floats."""
+    file = sample.files.get("rgb_linear", "")
+    if file.endswith(".exr"):
+        return file
+    return Coded(sample.index, "light.exr", lambda: encode_exr(half_floats(sample.channels["rgb_linear"])))
 
 
 def opaque(pixels: NDArray[np.uint8]) -> NDArray[np.uint8]:
