@@ -111,6 +111,7 @@ FORMAT = FormatSpec(
     read_by=("panopticapi", "datumaro"),
     channels=("rgb", "panoptic"),
     names_credits=False,
+    panoramas=True,
     writer=writer,
     preparer=preparer,
     verify=verify,

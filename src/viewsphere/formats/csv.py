@@ -167,6 +167,7 @@ FORMAT = FormatSpec(
     options=_Options,
     channels=(),  # pictures are used if there are any
     names_credits=False,
+    panoramas=True,
     writer=_writer,
     preparer=_preparer,
     verify=_verify,

@@ -193,6 +193,7 @@ FORMAT = FormatSpec(
     needs=_needs,
     refuses=_refuses,
     check=_check,
+    panoramas=True,
     writer=writer,
     preparer=preparer,
     verify=verify,

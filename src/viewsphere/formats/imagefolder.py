@@ -130,6 +130,7 @@ FORMAT = FormatSpec(
     channels=("rgb",),
     names_credits=False,
     refuses=_refuses,
+    panoramas=True,
     writer=writer,
     preparer=preparer,
     verify=verify,

@@ -188,6 +188,7 @@ FORMAT = FormatSpec(
     pictures=ALL_PICTURES,
     options=_Options,
     names_credits=False,
+    panoramas=True,
     writer=_writer,
     verify=_verify,
 )

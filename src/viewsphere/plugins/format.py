@@ -46,6 +46,11 @@ class FormatSpec(SpecWithOptions):
     panoramas: bool = Field(
         default=False, description="whether it holds pictures of lenses without z-depth, such as panoramas; others are refused"
     )
+    holds_seam: bool = Field(
+        default=False,
+        description="whether boxes may reach across the seam of a full turn; False: samples have such an object as two, with "
+        "one id and `seam_piece` 1 and 2 in `extra`",
+    )
     refuses: Annotated[Callable[..., Iterator[str]] | None, Takes(1)] = Field(
         default=None,
         description="the parts of a `viewsphere.formats.Scope` that the format cannot hold, as `expected ...; found ...`",

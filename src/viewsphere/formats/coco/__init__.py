@@ -83,6 +83,7 @@ FORMAT = FormatSpec(
     options=Options,
     channels=CHANNELS,
     notes=notes,
+    panoramas=True,
     writer=_writer,
     preparer=_preparer,
     verify=_verify,

@@ -15,14 +15,24 @@ from numpy.typing import NDArray
 
 from viewsphere.errors import ViewsphereError
 from viewsphere.formats.coco.categories import Names, Options, category_ids, object_points, point_names
-from viewsphere.formats.coco.writing import Entries, Entry, file_name, file_names, files, instances, seen
+from viewsphere.formats.coco.writing import (
+    Entries,
+    Entry,
+    annotation_id,
+    file_name,
+    file_names,
+    files,
+    instances,
+    seen,
+)
 from viewsphere.formats.shared.json_proof import check_json
 from viewsphere.formats.shared.json_rows import Where, rows
 from viewsphere.formats.shared.writing.export_files import Expected, check_files, models
 from viewsphere.geometry.mask import encode_rle, mask_box
-from viewsphere.model.sample import Sample
+from viewsphere.model.sample import ObjectAnnotation, Sample
 from viewsphere.plugins.format import Remark
 from viewsphere.scratch import temporary
+from viewsphere.store.samples.seam_pieces import PIECE
 
 if TYPE_CHECKING:
     from viewsphere.store import Dataset
@@ -64,10 +74,10 @@ def compare_with_pycocotools(
     samples = (dataset[i] for i in positions[:: max(1, -(-len(positions) // MOST_FRAMES))])
     ids, names = category_ids(dataset, options), point_names(dataset)
     truths = {
-        dataset.plan.annotation_id(sample.index, number): truth
+        annotation_id(dataset, sample, o): truth
         for sample in samples
         if sample.split == split and all(o.source is None for o in sample.objects)
-        for number, truth in _truths(sample, ids, names)
+        for o, truth in _truths(sample, ids, names)
     }
     if not truths or not file.is_file():
         return
@@ -83,18 +93,18 @@ def compare_with_pycocotools(
         yield None, f"{file.name}: expected COCO instances, found {type(error).__name__}: {error}"
 
 
-def _truths(sample: Sample, ids: Mapping[int, int], names: Names) -> Iterator[tuple[int, _Truth]]:
-    """The visible objects by their ids, taken from the run lengths if there is no map."""
+def _truths(sample: Sample, ids: Mapping[int, int], names: Names) -> Iterator[tuple[ObjectAnnotation, _Truth]]:
+    """The visible objects, taken from the run lengths if there is no map, or if a seam cuts the object."""
     try:
         instances = sample.channels["instances"]
     except (KeyError, ViewsphereError):
         instances = None
     for o in sample.objects:
-        mask = o.mask if instances is None else instances == o.id
+        mask = o.mask if instances is None or PIECE in o.extra else instances == o.id
         if box := mask_box(mask):
             x0, y0, x1, y1 = box
             points = object_points(o, names).get("keypoints", [])
-            yield o.id, _Truth(sample.index, ids[o.category_id], mask, [x0, y0, x1 - x0, y1 - y0], points)
+            yield o, _Truth(sample.index, ids[o.category_id], mask, [x0, y0, x1 - x0, y1 - y0], points)
 
 
 def _loaded(file: Path, images: Collection[int]) -> Any:

@@ -33,11 +33,15 @@ from viewsphere.geometry.mask import mask_polygons
 from viewsphere.model.channel import missing
 from viewsphere.model.sample import Box, ObjectAnnotation, Sample
 from viewsphere.store.credits import credited
+from viewsphere.store.samples.seam_pieces import PIECE
 
 if TYPE_CHECKING:
     from viewsphere.store import Dataset
 
 FOLDER_SIZE = 10_000
+SECOND = 1 << 40
+"""Offset of the annotation ids of second parts: above the ids of all plans, and exact in JSON."""
+
 CAPTIONS = "captions"
 """The label whose sentences are exported if a data set has it."""
 
@@ -189,14 +193,14 @@ class Entries:
         """COCO's annotations of all visible objects, and of imported objects with a box."""
         for o in sample.objects:
             own = {
-                "id": self._dataset.plan.annotation_id(sample.index, o.id),
+                "id": annotation_id(self._dataset, sample, o),
                 "image_id": sample.index + 1,
                 "category_id": self._ids[o.category_id],
             }
             if o.source is not None and (o.area or o.box2d is not None):
                 yield _foreign_annotation(o, own, self._names)
             elif o.source is None and o.area:
-                outline = _outline(o, masks[o.id], self._options)
+                outline = _outline(o, o.mask if PIECE in o.extra else masks[o.id], self._options)
                 mask_file = _mask_file(self._dataset, sample, o.id)
                 yield own | _annotation(sample, o, outline, mask_file) | object_points(o, self._names)
 
@@ -212,8 +216,17 @@ def _caption_records(sample: Sample) -> Iterator[dict[str, Any]]:
 
 
 def seen(sample: Sample) -> Masks:
-    """Every object's mask, decoded once; imported ones stay as they are."""
-    return {o.id: o.mask for o in sample.objects if o.area and o.source is None}
+    """Every object's mask, decoded once, whole also across a seam; imported ones stay as they are."""
+    masks = dict[int, NDArray[np.bool_]]()
+    for o in sample.objects:
+        if o.area and o.source is None:
+            masks[o.id] = masks[o.id] | o.mask if o.id in masks else o.mask
+    return masks
+
+
+def annotation_id(dataset: Dataset, sample: Sample, o: ObjectAnnotation) -> int:
+    """The number of an object's annotation; the second part of an object across a seam has one beyond all others."""
+    return dataset.plan.annotation_id(sample.index, o.id) + (SECOND if o.extra.get(PIECE) == 2 else 0)
 
 
 def files(dataset: Dataset, sample: Sample, masks: Masks, options: Options) -> Iterator[Expected]:

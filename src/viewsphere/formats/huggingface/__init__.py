@@ -60,6 +60,7 @@ FORMAT = FormatSpec(
     read_by=("datasets",),
     options=Options,
     check=_check,
+    panoramas=True,
     writer=_writer,
     verify=verify,
 )

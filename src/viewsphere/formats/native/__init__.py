@@ -72,6 +72,7 @@ FORMAT = FormatSpec(
     read_by=("any JSON reader",),
     panoramas=True,
     pictures=ALL_PICTURES,
+    holds_seam=True,
     refuses=_refuses,
     writer=_writer,
     preparer=_preparer,

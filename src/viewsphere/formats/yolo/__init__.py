@@ -43,6 +43,7 @@ FORMAT = FormatSpec(
     channels=("rgb",),
     names_credits=False,
     needs=_needs,
+    panoramas=True,
     writer=writer,
     preparer=preparer,
     verify=verify,

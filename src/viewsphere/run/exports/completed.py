@@ -60,13 +60,13 @@ class Completed(Exported):
     """
 
     def __init__(
-        self, root: str | os.PathLike[str], choice: Choice | None, least: float | None, names: tuple[str, ...]
+        self, root: str | os.PathLike[str], choice: Choice | None, least: float | None, names: tuple[str, ...], cuts: bool
     ) -> None:
-        super().__init__(root, choice, least)
+        super().__init__(root, choice, least, cuts)
         self._names = names
 
     def __reduce__(self) -> tuple[Any, ...]:  # pyright: ignore[reportIncompatibleMethodOverride]
-        return type(self), (self.root, self.choice, self.least, self._names)
+        return type(self), (self.root, self.choice, self.least, self._names, self.cuts)
 
     def shown(self, sample: Sample) -> Sample:
         """A sample with the computed labels."""

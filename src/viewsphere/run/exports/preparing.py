@@ -6,7 +6,7 @@ import time
 from collections.abc import Callable, Generator, Iterator, Sequence
 from contextlib import AbstractContextManager, closing, contextmanager
 from dataclasses import dataclass
-from functools import cache, partial
+from functools import cache, cached_property, partial
 from itertools import chain, repeat
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -41,7 +41,7 @@ Entries = Sequence[tuple[FormatEntry, Path]]
 
 
 class Views:
-    """Views of a data set for formats. Formats that leave out the same annotations and lack the same labels share one view."""
+    """Views of a data set for formats. Formats that need the same annotations and labels share one view."""
 
     def __init__(self, dataset: Dataset) -> None:
         self._dataset = dataset
@@ -55,20 +55,27 @@ class Views:
         from viewsphere.run.exports.completed import lacking  # which loads what reads and draws models
 
         spec = plugins.load(FormatSpec, entry.name)
-        return self._seen(None if spec.keeps_all_objects else least, lacking(self._dataset, spec, entry))
+        cuts = not spec.holds_seam and self._has_seam
+        return self._seen(None if spec.keeps_all_objects else least, lacking(self._dataset, spec, entry), cuts)
 
-    def _made(self, least: float | None, names: tuple[str, ...]) -> Dataset:
-        if least is None and not names:
+    @cached_property
+    def _has_seam(self) -> bool:
+        """Whether pictures of a full turn are among those of the data set."""
+        rigs = (shot.rig for shot in self._dataset.shots_of_parts if shot is not None)
+        return any(sensor.intrinsics.lens.period is not None for rig in rigs for sensor in rig.sensors)
+
+    def _made(self, least: float | None, names: tuple[str, ...], cuts: bool) -> Dataset:
+        if least is None and not names and not cuts:
             return self._dataset
         from viewsphere.run.exports.completed import Completed
 
         root, choice = self._dataset.root, self._dataset.choice
         if names:
-            shown = Completed(root, choice, least, names)
+            shown = Completed(root, choice, least, names, cuts)
             self._completed = self._completed or shown
             shown.reconstructor = self._completed.reconstructor  # shared, so that views are reconstructed once
         else:
-            shown = Exported(root, choice, least)
+            shown = Exported(root, choice, least, cuts)
         shown.link_kinds, shown.made = self._dataset.link_kinds, self._dataset.made
         return shown
 

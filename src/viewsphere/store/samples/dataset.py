@@ -31,6 +31,7 @@ from viewsphere.store.paths import file_inside, files_inside, names
 from viewsphere.store.samples.channel_files import decode
 from viewsphere.store.samples.choice import Choice
 from viewsphere.store.samples.point_tracks import PointTracks, joined
+from viewsphere.store.samples.seam_pieces import cut_at_seam
 from viewsphere.store.samples.selection import Selection, check_fields
 from viewsphere.store.shots.folder import Store
 from viewsphere.store.shots.manifest import MANIFEST, Manifest
@@ -771,19 +772,19 @@ class _Made:
 
 class Exported(Dataset):
     """A data set whose samples lack the annotations that exports leave out: those with a visibility of at most `least`, if
-    given.
+    given. With `cuts`, an object across the seam of a full turn is two objects.
     """
 
-    def __init__(self, root: str | os.PathLike[str], choice: Choice | None, least: float | None) -> None:
+    def __init__(self, root: str | os.PathLike[str], choice: Choice | None, least: float | None, cuts: bool = False) -> None:
         super().__init__(root, choice)
-        self.least = least
+        self.least, self.cuts = least, cuts
 
-    def __reduce__(self) -> tuple[type[Dataset], tuple[Path, Choice, float | None]]:  # pyright: ignore[reportIncompatibleMethodOverride]
-        return type(self), (self.root, self.choice, self.least)
+    def __reduce__(self) -> tuple[type[Dataset], tuple[Path, Choice, float | None, bool]]:  # pyright: ignore[reportIncompatibleMethodOverride]
+        return type(self), (self.root, self.choice, self.least, self.cuts)
 
     def shown(self, sample: Sample) -> Sample:
         """A sample of the data set with the kept annotations; imported objects have no known visibility."""
-        if self.least is None:
-            return sample
-        kept = tuple(o for o in sample.objects if o.source is not None or o.visibility > self.least)
-        return replace(sample, objects=kept)
+        if self.least is not None:
+            kept = tuple(o for o in sample.objects if o.source is not None or o.visibility > self.least)
+            sample = replace(sample, objects=kept)
+        return cut_at_seam(sample) if self.cuts else sample
