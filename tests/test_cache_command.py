@@ -31,7 +31,8 @@ def test_info_counts_files_and_bytes_of_each_kind(filled):
     told = json.loads(viewsphere("cache", "--json").stdout)
     sizes = {kind: held["bytes"] for kind, held in told["kinds"].items()}
     assert told["folder"] == str(filled)
-    assert sizes == {"kernels": 0, "light": sizes["zoo"], "models": sizes["zoo"], "parts": 0, "zoo": sizes["zoo"]}
+    assert {kind for kind, size in sizes.items() if size} == {"light", "models", "zoo"}
+    assert sizes["light"] == sizes["models"] == sizes["zoo"]
     assert sizes["zoo"] == (filled / "zoo" / "older.arrays").stat().st_size > 4_000
     assert "light" in viewsphere("cache").stdout
 

@@ -54,6 +54,18 @@ def test_a_result_is_made_once(cache):
     assert [path.name for path in cache_of("light").iterdir()] == [f"a{SUFFIX}"]
 
 
+@pytest.mark.parametrize("size, is_read", [(1000, False), (arrays.MAPPED_BYTES, True)])
+def test_a_large_new_result_has_the_memory_of_the_entry(size, is_read):
+    values = np.arange(size, dtype=np.uint8)
+    given = "light", "a", lambda: values, lambda new: Content(None, {"b": new}), lambda content: content.arrays["b"]
+    first = cached(*given)
+    np.testing.assert_array_equal(first, values)
+    assert (first is not values) == is_read
+    file_of("a").unlink()
+    file_of("a").mkdir()  # nothing can be read back
+    np.testing.assert_array_equal(cached(*given), values)
+
+
 @pytest.mark.parametrize("damage", [b"", b"x" * 2000, b"VSA0", None])
 def test_a_damaged_entry_is_removed_and_made_anew(damage):
     made("a")

@@ -10,7 +10,9 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
+from scratch import scratch_cache
 from viewsphere.assets.mesh import Image, Material, Texture
+from viewsphere.caches import cache_of
 from viewsphere.engines.raster.materials import bundles
 from viewsphere.engines.raster.materials.bundles import BundlePacker
 from viewsphere.engines.raster.materials.kernels_filter import PLANES
@@ -194,3 +196,69 @@ def test_no_texture_is_reduced_while_there_is_room(monkeypatch):
     monkeypatch.setattr(bundles, "MOST_WORDS", whole.texels.size - 4 * PLANES - 1)
     _, less = packed(given, *materials)
     assert less.levels[:, 0, 1:].tolist() == [[8, 8]] + [[16, 16]] * 3
+
+
+@pytest.fixture
+def cache(tmp_path, monkeypatch):
+    scratch_cache(monkeypatch, tmp_path / "cache")
+    return lambda: sorted(cache_of("textures").glob("*.arrays"))
+
+
+def of_place(given, *materials):
+    """The textures of a place, in a new process."""
+    bundles._kept.cache_clear()
+    packer = BundlePacker()
+    for m in materials:
+        packer.add(m, given, (True, True), is_scenery=True)
+    return packer.pack()
+
+
+def test_textures_of_places_are_the_same_from_the_cache(cache, monkeypatch):
+    given, materials = images(11, *[(256, 256)] * 6, (8, 8)), [material(0), material(3), material(6, SET[:1])]
+    _, alone = packed(given, *materials)
+    assert not cache()
+    build, built = bundles._build, []
+    monkeypatch.setattr(bundles, "_build", lambda content, words: built.append(content.shape) or build(content, words))
+    for expected in ([(256, 256), (256, 256), (8, 8)], [(8, 8)]):  # small ones are not stored
+        textures = of_place(given, *materials)
+        assert built == expected
+        del built[:]
+        for bundle in range(3):
+            np.testing.assert_array_equal(words_of(textures, bundle), words_of(alone, bundle))
+        assert not textures.texels[-4 * PLANES :].any()
+    assert len(cache()) == 2
+    of_place(images(11, *[(256, 256)] * 6), *materials[:2])  # equal pictures, other objects
+    assert not built and len(cache()) == 2
+
+
+def test_other_pictures_and_uses_have_entries_of_their_own(cache):
+    given = images(12, *[(256, 256)] * 3)
+    of_place(given, material(0))
+    changed = [Image(image.name, image.pixels.copy()) for image in given]
+    changed[2].pixels[0, 0, 1] ^= 1
+    of_place(changed, material(0))
+    of_place(given, material(0, alpha_mode="MASK"))
+    of_place(given, material(0, ("base_color_texture", "normal_texture", "clearcoat_texture"), clearcoat=1.0))
+    assert len(cache()) == 4
+
+
+@pytest.mark.parametrize("place", [0, 30, -1])
+def test_damaged_textures_are_built_anew(cache, place):
+    given = images(13, *[(256, 256)] * 3)
+    whole = of_place(given, material(0))
+    words = words_of(whole, 0).copy()
+    del whole
+    (file,) = cache()
+    content = bytearray(file.read_bytes())
+    content[place] ^= 1
+    file.unlink()  # a mapped file must not change in place
+    file.write_bytes(content)
+    np.testing.assert_array_equal(words_of(of_place(given, material(0)), 0), words)
+
+
+def test_without_room_textures_are_built_each_time(cache, monkeypatch):
+    monkeypatch.setenv("VIEWSPHERE_CACHE_LIMIT", "1000")
+    given = images(14, *[(256, 256)] * 3)
+    first, second = (words_of(of_place(given, material(0)), 0).copy() for _ in range(2))
+    np.testing.assert_array_equal(first, second)
+    assert not cache()

@@ -50,6 +50,22 @@ most = held()
 kept.clear()
 print(told, most - before, held() - before)
 """
+RELEASED = """
+import sys
+import numpy as np
+from viewsphere.run.workers.allocator import keep_freed_memory, release_freed_memory
+
+def held():
+    return [int(line.split()[1]) for line in open("/proc/self/status") if line.startswith("VmRSS")][0] * 1024
+
+told = keep_freed_memory()
+before, count = held(), int(sys.argv[1])
+kept = [np.ones(1 << 18, np.float32) for _ in range(count)]
+after = [np.ones(100, np.float32) for _ in range(100)]  # in use, behind what is freed
+most = held()
+kept.clear()
+print(release_freed_memory(), most - before, held() - before)
+"""
 FRAME, LARGE = "(480, 640, 3), 16", "(4096, 4096), 4"  # 59 MB in all; 268 MB, each more than glibc puts on the heap by itself
 
 
@@ -130,3 +146,12 @@ def test_workers_and_the_command_line_keep_memory_and_not_the_users_process(proc
 def test_who_tells_the_allocator_something_is_obeyed(environment):
     told, _ = answered(NEW_PAGES, FRAME, **environment)
     assert not told
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
+@pytest.mark.parametrize("count, is_released", [(100, True), (10, False)])
+def test_much_free_memory_is_released_though_memory_behind_it_is_in_use(count, is_released):
+    told, (most, left) = answered(RELEASED, str(count))
+    assert told == is_released
+    assert most > 0.9 * count * (1 << 20)
+    assert (left < 8 << 20) == is_released

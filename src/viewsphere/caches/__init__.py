@@ -20,6 +20,7 @@ KINDS: Mapping[str, str] = {
     "light": "baked light",
     "models": "model files as they were read",
     "parts": "convex parts of models",
+    "textures": "textures of places at all sizes",
     "zoo": "models of the zoo",
 }
 """Folders of the cache and a description of their content. All of it can be recreated."""

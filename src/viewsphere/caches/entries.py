@@ -31,16 +31,30 @@ T = TypeVar("T")
 
 
 def cached(kind: str, digest: str, make: Callable[[], T], pack: Callable[[T], Content], unpack: Callable[[Content], T]) -> T:
-    """The result of `make`, read from the cache if it has an entry of this kind and digest."""
+    """The result of `make`, read from the cache if it has an entry of this kind and digest.
+
+    A large result that is new is read back, too, so that the caller has the memory that other processes map.
+    """
+    from viewsphere.caches.arrays import MAPPED_BYTES
+
     file = cache_of(kind) / f"{digest}{SUFFIX}"
-    content = read_entry(file)
-    if content is not None:
-        with suppress(ValueError, LookupError, TypeError, AttributeError, RecursionError):  # hostile, in spite of its digest
-            return unpack(content)
+    for held in _held(file, unpack):
+        return held
     result = make()
     packed = pack(result)
     write_entry(file, packed.about, packed.arrays)
+    if sum(values.nbytes for values in packed.arrays.values()) >= MAPPED_BYTES:
+        for held in _held(file, unpack):
+            return held
     return result
+
+
+def _held(file: Path, unpack: Callable[[Content], T]) -> Generator[T]:
+    """Yield the result in an entry, if there is one."""
+    content = read_entry(file)
+    if content is not None:
+        with suppress(ValueError, LookupError, TypeError, AttributeError, RecursionError):  # hostile, in spite of its digest
+            yield unpack(content)
 
 
 def read_entry(file: Path) -> Content | None:

@@ -45,13 +45,13 @@ Kind = Literal[
 ]
 
 
-class Specified(Protocol):
+class _Specified(Protocol):
     """A class of specs: the plug-ins of a kind. The classes need pydantic, which listing names does without."""
 
     KIND: ClassVar[Kind]
 
 
-S = TypeVar("S", bound=Specified)
+S = TypeVar("S", bound=_Specified)
 V = TypeVar("V")
 
 
@@ -119,7 +119,7 @@ def loadable(spec: type[S]) -> dict[str, S]:
     return found
 
 
-def checked(spec: type[Specified], name: str, field: str, value: Any, *types: type[V]) -> V:
+def checked(spec: type[_Specified], name: str, field: str, value: Any, *types: type[V]) -> V:
     """The value that a function of a plug-in returned; raises PluginError for one of other types than these."""
     if isinstance(value, types):
         return value

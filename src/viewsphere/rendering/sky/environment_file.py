@@ -36,7 +36,7 @@ _ROUNDING = -1e-3  # negative radiance down to this counts as a compression erro
 
 
 @dataclass(frozen=True, eq=False)
-class EnvironmentPicture:
+class _EnvironmentPicture:
     """pixels (H, W, 3) float32: linear radiance, none negative, rows from the zenith down; notes: the repairs that were
     needed, without the file's name.
     """
@@ -45,7 +45,7 @@ class EnvironmentPicture:
     notes: tuple[str, ...]
 
 
-def read_environment(path: Path) -> EnvironmentPicture:
+def read_environment(path: Path) -> _EnvironmentPicture:
     """Read an equirectangular picture, reduced to at most `SHARPEST` wide. Its content, not its name, determines the format.
 
     A few NaN texels become 0, infinite ones the greatest finite radiance, negative ones 0. PNG, JPEG and similar pictures are
@@ -86,7 +86,7 @@ def _version(library: str) -> str:
         return "none"
 
 
-def _read(path: Path) -> EnvironmentPicture:
+def _read(path: Path) -> _EnvironmentPicture:
     notes: list[str] = []
     head = read_head(path)
     if isinstance(head, ExrHead):
@@ -96,7 +96,7 @@ def _read(path: Path) -> EnvironmentPicture:
     else:
         pixels = _read_ordinary(path)
         notes.append("expected an EXR or HDR picture; 8 bits cannot hold a bright light, taken as sRGB")
-    return EnvironmentPicture(_reduced(_mended(path, pixels, notes)), tuple(notes))
+    return _EnvironmentPicture(_reduced(_mended(path, pixels, notes)), tuple(notes))
 
 
 def _error(path: Path, found: str) -> UnreadableError:

@@ -21,6 +21,7 @@ from viewsphere.run.shots.composing import Composer
 from viewsphere.run.shots.models import Models
 from viewsphere.run.shots.precompile import compile_kernels
 from viewsphere.run.shots.stages import Stages, StoredBoxes
+from viewsphere.run.workers.allocator import release_freed_memory
 from viewsphere.store import Row, Store
 
 Kind = Literal["model", "same model", "damaged model"]
@@ -102,3 +103,5 @@ def _counted(samples: Iterable[Sample], tell: Callable[[int], None]) -> Iterator
     for number, sample in enumerate(samples, 1):
         yield sample
         tell(number)
+        if number == 1:  # the stage is complete
+            release_freed_memory()

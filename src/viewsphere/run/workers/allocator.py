@@ -13,6 +13,11 @@ import platform
 KEPT_BYTES = 1 << 29
 """Bytes of free memory at the heap's end that a process keeps before it returns any, such as after a large frame."""
 
+FREED_BYTES = 1 << 25
+"""Bytes of free memory in the heap above which `release_freed_memory` releases it. A frame of 640 x 480 frees about as
+much.
+"""
+
 _M_TRIM_THRESHOLD, _M_MMAP_MAX = -1, -4  # malloc.h
 
 
@@ -32,3 +37,26 @@ def keep_freed_memory() -> bool:
         return False
     libc = ctypes.CDLL(None)
     return bool(libc.mallopt(_M_MMAP_MAX, 0) and libc.mallopt(_M_TRIM_THRESHOLD, KEPT_BYTES))
+
+
+def release_freed_memory() -> bool:
+    """Give all free pages of the heap back to the system if there are more than FREED_BYTES; returns whether this was done.
+
+    Call it when the data of a shot is complete: to build it, and above all to bake light, takes memory that no frame needs.
+    Unlike `keep_freed_memory`'s limit, this includes free pages in front of memory in use. Needs glibc 2.33. See
+    malloc_trim(3).
+    """
+    if platform.libc_ver()[0] != "glibc":
+        return False
+    libc = ctypes.CDLL(None)
+    if not hasattr(libc, "mallinfo2"):
+        return False
+    libc.mallinfo2.restype = _Heap
+    return libc.mallinfo2().free > FREED_BYTES and bool(libc.malloc_trim(0))
+
+
+class _Heap(ctypes.Structure):
+    """struct mallinfo2 of malloc.h: numbers of bytes and blocks. free: fordblks, the bytes of free blocks."""
+
+    _names = ("arena", "ordblks", "smblks", "hblks", "hblkhd", "usmblks", "fsmblks", "uordblks", "free", "keepcost")
+    _fields_ = [(name, ctypes.c_size_t) for name in _names]

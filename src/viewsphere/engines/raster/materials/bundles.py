@@ -9,18 +9,24 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache, cached_property
 from heapq import heapify, heapreplace
-from itertools import accumulate, pairwise
-from weakref import WeakValueDictionary
+from itertools import pairwise
+from weakref import WeakKeyDictionary, WeakValueDictionary
 
 import numpy as np
+import xxhash
 from numpy.typing import NDArray
 
 from viewsphere.assets.mesh import WRAPS, Image, Material, Texture
+from viewsphere.caches import cache_of
+from viewsphere.caches.arrays import MAPPED_BYTES, Content
+from viewsphere.caches.entries import SUFFIX, cached
+from viewsphere.caches.joined import Stored, joined
 from viewsphere.codecs.srgb import linear
 from viewsphere.engines.raster.materials.kernels_filter import PLANES
 from viewsphere.engines.raster.materials.kernels_material import BASE, BUMP, COAT_BUMP, GLOW, ROUGHNESS, SPECULAR_COLOR
 from viewsphere.engines.raster.materials.kernels_mips import ZERO_NORMAL, fill, fill_normals, halve
 from viewsphere.engines.raster.records import Int32, Textures
+from viewsphere.rendering.kept_light import digest_of
 
 Words = NDArray[np.uint16]
 
@@ -65,11 +71,12 @@ USES = {
 @dataclass(frozen=True)
 class _Content:
     """The content of a bundle: images and the material's fields that use them. If `weighted`, colours are weighted by their
-    alpha.
+    alpha. Large contents of scenery are stored in the cache, because other shots and workers have the same place.
     """
 
     uses: tuple[tuple[Image, str], ...]
     weighted: bool
+    is_scenery: bool
     factor: int = 1
 
     @property
@@ -105,7 +112,9 @@ class BundlePacker:
 
     _slots: dict[tuple[_Content, Texture], int] = field(default_factory=dict[tuple[_Content, Texture], int])
 
-    def add(self, material: Material, images: Sequence[Image], has_uv: tuple[bool, bool]) -> list[int]:
+    def add(
+        self, material: Material, images: Sequence[Image], has_uv: tuple[bool, bool], is_scenery: bool = False
+    ) -> list[int]:
         """Indices of the material's bundles, padded to MOST of them with -1; textures without coordinates are left out."""
         groups: dict[tuple[tuple[int, ...], Texture], list[tuple[Image, str]]] = {}
         for name in USES:
@@ -118,7 +127,7 @@ class BundlePacker:
         for (_, texture), uses in groups.items():
             base = [image for image, name in uses if name == "base_color_texture"]
             weighted = material.alpha_mode != "OPAQUE" and any(image.pixels[..., 3].min() < 255 for image in base)
-            numbers.append(self._slots.setdefault((_Content(tuple(uses), weighted), texture), len(self._slots)))
+            numbers.append(self._slots.setdefault((_Content(tuple(uses), weighted, is_scenery), texture), len(self._slots)))
         return numbers + [-1] * (MOST - len(numbers))
 
     def pack(self) -> Textures:
@@ -128,8 +137,8 @@ class BundlePacker:
         modes = np.zeros((count, 14), np.int32)
         transforms = np.zeros((count, 6), np.float32)
         contents = _affordable(content for content, _ in self._slots)
-        texels = _kept().get(tuple(contents.values()))
-        firsts = dict(zip(contents, _firsts(contents.values()), strict=True))
+        texels, starts = _kept().get(tuple(contents.values()))
+        firsts = dict(zip(contents, starts, strict=True))
         for (content, texture), slot in self._slots.items():
             own = contents[content].levels
             levels[slot, : len(own)] = own
@@ -169,46 +178,71 @@ def _affordable(contents: Iterable[_Content]) -> dict[_Content, _Content]:
     return reduced
 
 
-def _firsts(contents: Iterable[_Content]) -> list[int]:
-    """The first word of each content if all contents are stored one after another."""
-    return list(accumulate((content.words for content in contents), initial=0))[:-1]
-
-
 class _Kept:
     """Texels of earlier stages: up to KEPT_BYTES of the latest ones, and those of every stage that is still in use."""
 
     def __init__(self) -> None:
         self._last: OrderedDict[tuple[_Content, ...], Words] = OrderedDict()
         self._held: WeakValueDictionary[tuple[_Content, ...], Words] = WeakValueDictionary()
+        self._starts: dict[tuple[_Content, ...], list[int]] = {}
+        self._digests: WeakKeyDictionary[Image, str] = WeakKeyDictionary()
 
-    def get(self, contents: tuple[_Content, ...]) -> Words:
-        """Return the levels of these contents, one after another, with room at the end to read PLANES planes at once."""
+    def get(self, contents: tuple[_Content, ...]) -> tuple[Words, list[int]]:
+        """Return the levels of these contents with room at the end to read PLANES planes at once, and the first word of
+        each.
+        """
         texels = self._held.get(contents)
         if texels is None:
-            texels = self._held[contents] = self._packed(contents)
+            texels, starts = self._packed(contents)
+            self._held[contents] = texels
+            self._starts = {held: self._starts[held] for held in self._held if held in self._starts} | {contents: starts}
         if texels.nbytes <= KEPT_BYTES:
             self._last[contents] = texels
             self._last.move_to_end(contents)
         while sum(texels.nbytes for texels in self._last.values()) > KEPT_BYTES:
             self._last.popitem(last=False)
-        return texels
+        return texels, self._starts[contents]
 
-    def _packed(self, contents: tuple[_Content, ...]) -> Words:
+    def _packed(self, contents: tuple[_Content, ...]) -> tuple[Words, list[int]]:
         """Texels built in their final array: a second copy would cost more than the texels themselves."""
         known = {
             content: texels[first:]
             for others, texels in self._held.items()
-            for content, first in zip(others, _firsts(others), strict=True)
+            for content, first in zip(others, self._starts[others], strict=True)
         }
-        texels = np.empty(sum(content.words for content in contents) + 4 * PLANES, np.uint16)
+        parts = [self._stored(content, known.get(content)) for content in contents]
+        texels, starts = joined(parts, np.uint16, 4 * PLANES)
         texels[-4 * PLANES :] = 0
-        for content, first in zip(contents, _firsts(contents), strict=True):
-            words = texels[first : first + content.words]
-            if content in known:
-                words[:] = known[content][: content.words]
-            else:
-                _build(content, words)
-        return texels
+        for content, part, first in zip(contents, parts, starts, strict=True):
+            if isinstance(part, int):
+                _write(content, texels[first : first + part], known.get(content))
+        return texels, starts
+
+    def _stored(self, content: _Content, known: Words | None) -> Stored | int:
+        """The content's levels in the cache, or their number of words if they are not to be cached."""
+        if not content.is_scenery or content.words * 2 < MAPPED_BYTES:
+            return content.words
+        images = [(self._digest(image), image.pixels.shape, name) for image, name in content.uses]
+        digest = digest_of(("texels", images, content.weighted, content.factor))
+
+        def make() -> Words:
+            words = np.empty(content.words, np.uint16)
+            _write(content, words, known)
+            return words
+
+        def unpack(held: Content) -> Words:
+            words = held.arrays["words"]
+            if words.shape != (content.words,) or words.dtype != np.uint16:
+                raise ValueError("other words")
+            return words
+
+        words = cached("textures", digest, make, lambda words: Content(None, {"words": words}), unpack)
+        return Stored(words, cache_of("textures") / f"{digest}{SUFFIX}")
+
+    def _digest(self, image: Image) -> str:
+        if image not in self._digests:
+            self._digests[image] = xxhash.xxh3_128_hexdigest(np.ascontiguousarray(image.pixels).data)
+        return self._digests[image]
 
 
 @cache
@@ -220,6 +254,14 @@ def _kept() -> _Kept:
 def _tables() -> tuple[Words, Words]:
     """The words (uint16) of the 256 byte values: one table for plain numbers, and one that converts sRGB to linear light."""
     return np.arange(256, dtype=np.uint16) * np.uint16(257), np.round(linear(np.arange(256) / 255) * 65535).astype(np.uint16)
+
+
+def _write(content: _Content, words: Words, known: Words | None) -> None:
+    """Write all mip levels of a content into `words`, copied if they are known."""
+    if known is None:
+        _build(content, words)
+    else:
+        words[:] = known[: content.words]
 
 
 def _build(content: _Content, words: Words) -> None:

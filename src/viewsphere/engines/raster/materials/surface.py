@@ -70,7 +70,7 @@ def pack_materials(
             for original in mesh.materials:
                 m, repaint = repainted(original, repaints)
                 looks.append(material_row(m, repaint, scenery=i >= targets))
-                bundles.append(packer.add(m, mesh.images, has_uv))
+                bundles.append(packer.add(m, mesh.images, has_uv, is_scenery=i >= targets))
         first.append(first_row[kind])
     ground = ground or Ground()
     floor, images = ground_material(ground)

@@ -25,17 +25,17 @@ MOST = 1 << 16
 """Maximum number of combinations of triangles and rim directions that are compared at once."""
 
 
-class Shows(Protocol):
+class _Shows(Protocol):
     """The parts of `viewsphere.geometry.lenses.Lens` that the search uses."""
 
     @property
-    def has_unit_rays(self) -> bool: ...  # noqa: D102
-    def project(self, points: Float) -> tuple[Float, Flags]: ...  # noqa: D102
-    def directions(self) -> Float: ...  # noqa: D102
+    def has_unit_rays(self) -> bool: ...
+    def project(self, points: Float) -> tuple[Float, Flags]: ...
+    def directions(self) -> Float: ...
 
 
 def bounds(
-    lens: Shows, R: Float, t: Float, vertices: Float, is_used: Flags, triangles: NDArray[np.int32]
+    lens: _Shows, R: Float, t: Float, vertices: Float, is_used: Flags, triangles: NDArray[np.int32]
 ) -> tuple[Bounds | None, bool]:
     """The result of `viewsphere.geometry.lenses.Lens.bounds`.
 
@@ -61,7 +61,7 @@ def _grown(box: Bounds, pixels: Float) -> Bounds:
     return min(box[0], x0), min(box[1], y0), max(box[2], x1), max(box[3], y1)
 
 
-def _followed(lens: Shows, box: Bounds, ends: Float, pixels: Float) -> tuple[Bounds, bool]:
+def _followed(lens: _Shows, box: Bounds, ends: Float, pixels: Float) -> tuple[Bounds, bool]:
     """The box grown by edges (n, 2, 3) whose ends have the given positions, and whether the lens shows all of them."""
     whole = True
     for depth in range(HALVINGS):
@@ -87,7 +87,7 @@ def _followed(lens: Shows, box: Bounds, ends: Float, pixels: Float) -> tuple[Bou
 
 
 @lru_cache(maxsize=16)
-def _rim(lens: Shows) -> tuple[Float, Float]:
+def _rim(lens: _Shows) -> tuple[Float, Float]:
     """The rays (M, 3) of the outermost pixels with a ray in each row and column of the picture, and their centres (M, 2)."""
     directions = lens.directions()
     has_ray: Flags = ~np.isnan(directions[..., 0])
@@ -98,7 +98,7 @@ def _rim(lens: Shows) -> tuple[Float, Float]:
     return directions[down, across], np.stack((across, down), axis=-1) + np.float64(0.5)
 
 
-def _rim_inside(lens: Shows, triangles: Float) -> Float:
+def _rim_inside(lens: _Shows, triangles: Float) -> Float:
     """The positions of those `_rim` pixels whose rays hit one of the triangles (n, 3, 3) in camera axes."""
     rim, centres = _rim(lens)
     meets = np.zeros(len(rim), np.bool_)
