@@ -269,9 +269,6 @@ class Recipe(Shown, Frozen):
     def _as_meant(cls, value: tuple[str, ...], info: ValidationInfo) -> tuple[str, ...]:
         """The channels, with those that other fields require: tracks, points of LiDARs, and pictures with alpha."""
         scene: SceneEntry | None = info.data.get("scene")
-        camera: CameraEntry | None = info.data.get("camera")
-        if value is DEFAULT_CHANNELS and camera is not None and camera.lacks_depth:
-            value = tuple("depth_ray" if name == "depth" else name for name in value)
         if info.data.get("tracks") is not None:
             value = tuple(dict.fromkeys((*value, "tracks")))
         rig = info.data.get("rig")
@@ -323,6 +320,8 @@ class Recipe(Shown, Frozen):
         """Store the folder of relative paths, and the file's lines."""
         self._folder = Path((context or {}).get("folder", Path.cwd())).absolute()
         self._marks = (context or {}).get("marks") or Marks()
+        if self.camera.lacks_depth and "channels" not in self.model_fields_set:
+            self.__dict__["channels"] = tuple("depth_ray" if name == "depth" else name for name in self.channels)
 
     @contextmanager
     def located(self) -> Generator[None]:

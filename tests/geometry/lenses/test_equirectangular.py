@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from small import small_recipe
-from viewsphere import plan
+from viewsphere import Recipe, plan
 from viewsphere.errors import RecipeError
 from viewsphere.geometry.box import projected_bounds
 from viewsphere.geometry.camera import orbit_rotation, pixel_rays, project
@@ -139,3 +139,13 @@ def test_mistakes_are_told_in_one_line(name, given, told):
     with pytest.raises(RecipeError, match=told) as error:
         plan(small_recipe(camera={"projection": name, "size": [640, 320]} | given, channels=["rgb"]))
     assert "\n" not in str(error.value)
+
+
+def test_distances_along_rays_replace_depth_among_the_default_channels():
+    said = {"models": [{"source": "zoo:mug"}], "viewpoints": {"azimuth": [0], "distance": 1}, "formats": ["native"]}
+    recipe = Recipe.model_validate({**said, "camera": {"projection": "equirectangular", "size": [64, 32]}})
+    assert recipe.channels == ("rgb", "depth_ray", "instances", "normals")
+    assert Recipe.model_validate(recipe.model_dump(mode="json", exclude_defaults=True)).digest == recipe.digest
+    assert plan(recipe).frames == 1
+    with pytest.raises(RecipeError, match="found depth of the equirectangular camera: use depth_ray"):
+        plan(Recipe.model_validate({**recipe.model_dump(mode="json"), "channels": ["rgb", "depth"]}))
