@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from shots import still_shot
-from truth_scenes import LENSES, cube, lens, mesh_of, random_soup, sphere
+from truth_scenes import EVERY, cube, lens, mesh_of, random_soup, sphere
 from viewsphere.geometry.box3d import Box3d
 from viewsphere.geometry.camera import orbit_center, orbit_rotation, pixel_rays
 from viewsphere.geometry.rotation import random_rotation, rigid
@@ -31,7 +31,7 @@ def random_camera(rng, lens_name, distance=5.0):
     """A camera that looks at the origin from anywhere."""
     azimuth, elevation, tilt = rng.uniform(-3, 3), rng.uniform(0.15, 1.3), rng.uniform(-3, 3)
     rotation = orbit_rotation(azimuth, elevation, tilt)
-    intrinsics = lens(*SIZE, 1.1, LENSES[lens_name], skew=0.0 if LENSES[lens_name] else 1.5)
+    intrinsics = lens(*SIZE, 1.1, EVERY[lens_name], skew=0.0 if EVERY[lens_name] else 1.5)
     return Camera(intrinsics, rotation, -rotation @ orbit_center(azimuth, elevation, distance))
 
 
@@ -96,9 +96,9 @@ def embree(geometry, camera):
     known = np.isfinite(rays).all(axis=1)
     directions = np.where(known[:, None], rays, (0, 0, 1)) @ camera.R
     directions /= np.linalg.norm(directions, axis=1, keepdims=True)
-    origins = np.broadcast_to(camera.center, directions.shape)
+    origins = camera.center + camera.lens.origins().reshape(-1, 3) @ camera.R
     hit = scene.run(origins.astype(np.float32), directions.astype(np.float32), output=True)
     shape = (camera.height, camera.width)
     triangle = np.where(known, np.asarray(hit["primID"], np.int64), -1)
-    points = camera.center + np.asarray(hit["tfar"], np.float64)[:, None] * directions
+    points = origins + np.asarray(hit["tfar"], np.float64)[:, None] * directions
     return triangle.reshape(shape), points.reshape(*shape, 3)

@@ -19,7 +19,10 @@ from viewsphere.truth.raster.visibility import rasterize
 BARREL = lens_parameters("brown_conrady", coefficients=(-0.21, 0.06, 0.001, -0.002, -0.004))
 RATIONAL = lens_parameters("brown_conrady", coefficients=(0.4, 0.05, -0.001, 0.0007, 0.01, 0.6, 0.12, 0.02))
 FISHEYE = lens_parameters("fisheye", coefficients=(0.03, -0.004, 0.0007, -0.0001))
+PARALLEL = lens_parameters("orthographic")
 LENSES = {"pinhole": None, "barrel": BARREL, "rational": RATIONAL, "fisheye": FISHEYE}
+EVERY = {**LENSES, "orthographic": PARALLEL}
+"""All of them, and parallel rays, which begin at different places."""
 
 
 def mesh_of(vertices, triangles, normals=None, parts=None, **fields) -> Mesh:
@@ -50,6 +53,8 @@ def placed(*meshes: Mesh, moves=None, ground=False, label_alpha=0.01, scenery=0)
 def lens(width=64, height=48, fov=math.radians(60), distortion=None, **fields) -> Intrinsics:
     fisheye = distortion is not None and distortion.model == "fisheye"
     focal = width / fov if fisheye else width / (2 * math.tan(fov / 2))
+    if distortion is PARALLEL:
+        focal /= 4.0  # a picture as wide as a pinhole's at 4 m
     values = {"fx": focal, "fy": focal, "cx": width / 2, "cy": height / 2} | fields
     return Intrinsics(width=width, height=height, distortion=distortion, **values)
 
@@ -98,6 +103,13 @@ def least_weight(geometry: Geometry, u, v):
     return np.where(code == ENDLESS[0], u, np.where(code == ENDLESS[1], v, least))
 
 
+def begins(camera, world):
+    """Where the rays to points (N, 3) begin."""
+    if not camera.lens.is_parallel:
+        return np.broadcast_to(camera.center, world.shape)
+    return world - (world @ camera.R[2] + camera.t[2])[:, None] * camera.R[2]
+
+
 def cast(geometry: Geometry, camera: Camera, chunk: int = 256):
     """Brute force: every ray against every triangle in float64 numpy (Moller and Trumbore 1997).
 
@@ -108,15 +120,16 @@ def cast(geometry: Geometry, camera: Camera, chunk: int = 256):
     shape = rays.shape[:2]
     d = rays.reshape(-1, 3)
     x = geometry.vertices @ camera.R.T + camera.t
-    a, b, c = (x[geometry.triangles[:, k]] for k in range(3))
-    e1, e2 = b - a, c - a
+    begin = camera.lens.origins().reshape(-1, 1, 3)
+    corner, b, c = (x[geometry.triangles[:, k]] for k in range(3))
+    e1, e2 = b - corner, c - corner
     best = np.full(len(d), np.inf)
     second = np.full(len(d), np.inf)
     which = np.full(len(d), -1)
     margin = np.full(len(d), np.inf)
     with np.errstate(all="ignore"):
         for i in range(0, len(d), chunk):
-            r = d[i : i + chunk, None]
+            r, a = d[i : i + chunk, None], corner - begin[i : i + chunk]
             p = np.cross(r, e2)
             det = (p * e1).sum(-1)
             u = -(p * a).sum(-1) / det

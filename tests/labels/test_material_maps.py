@@ -10,7 +10,7 @@ from label_scenes import changed, embree, pictured, proof, random_camera, random
 from proven import equal
 from sealing import seal_again
 from small import small_recipe
-from truth_scenes import LENSES, cube, lens, mesh_of, orbit_camera, placed
+from truth_scenes import EVERY, cube, lens, mesh_of, orbit_camera, placed
 from viewsphere import generate
 from viewsphere.assets.exporting.exported import read_exported
 from viewsphere.assets.mesh import Material
@@ -44,7 +44,7 @@ def test_each_side_of_a_cube_has_its_own():
         assert set(np.unique(found)) == {0, expected}
 
 
-@pytest.mark.parametrize("name", LENSES)
+@pytest.mark.parametrize("name", EVERY)
 @pytest.mark.parametrize("seed", range(2))
 def test_embree_meets_triangles_of_these(name, seed):
     pytest.importorskip("embreex")
@@ -57,7 +57,7 @@ def test_embree_meets_triangles_of_these(name, seed):
     assert (sample.materials[sample.instances == 0] == 0).all()
 
 
-@pytest.mark.parametrize("name", LENSES)
+@pytest.mark.parametrize("name", EVERY)
 def test_its_proof_notices_others(name):
     sample, *_ = sample_of(1, name)
     assert proof(channel_labels()["materials"], sample) == []

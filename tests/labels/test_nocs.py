@@ -7,7 +7,7 @@ import pytest
 
 from label_scenes import changed, embree, proof, random_sample
 from proven import close
-from truth_scenes import LENSES, cube, lens, mesh_of, orbit_camera, placed, sphere
+from truth_scenes import EVERY, cube, lens, mesh_of, orbit_camera, placed, sphere
 from viewsphere.geometry.camera import pixel_rays
 from viewsphere.geometry.rotation import transform
 from viewsphere.labels import observe
@@ -59,13 +59,14 @@ def test_instances_of_other_sizes_have_equal_shares_and_scenery_has_none():
     assert np.isnan(observe(scenery, camera, visibility, ["nocs"])["nocs"]).all()
 
 
-@pytest.mark.parametrize("name", LENSES)
+@pytest.mark.parametrize("name", EVERY)
 @pytest.mark.parametrize("seed", range(3))
 def test_through_the_pose_they_are_what_embree_meets_and_lifted_depth(name, seed):
     pytest.importorskip("embreex")
     sample, geometry, visibility = random_sample(seed, name, NAMES)
     triangle, points = embree(geometry, sample.camera)
     lifted = pixel_rays(sample.camera.intrinsics) / visibility.inverse_depth[..., None].clip(1e-9)
+    lifted = lifted + sample.camera.lens.origins()
     compared = 0
     for o in sample.objects:
         own = (sample.instances == o.id) & (triangle == visibility.triangle)
@@ -78,7 +79,7 @@ def test_through_the_pose_they_are_what_embree_meets_and_lifted_depth(name, seed
     assert compared > 300
 
 
-@pytest.mark.parametrize("name", LENSES)
+@pytest.mark.parametrize("name", EVERY)
 def test_its_proof_notices_other_shares(name):
     sample, *_ = random_sample(1, name, NAMES)
     assert proof(LABEL, sample) == []

@@ -7,7 +7,7 @@ import pytest
 
 from label_scenes import changed, proof, random_sample
 from proven import equal
-from truth_scenes import LENSES
+from truth_scenes import EVERY
 from viewsphere.errors import StoreError
 from viewsphere.labels import LabelContext, channels
 from viewsphere.labels.panoptic import LABEL, MOST, class_of, compute, object_of, picture, renumbered
@@ -18,7 +18,7 @@ from viewsphere.truth.raster.triangle_labels import TriangleLabels
 NAMES = ("depth", "instances", "semantic", "panoptic")
 
 
-@pytest.mark.parametrize("name", LENSES)
+@pytest.mark.parametrize("name", EVERY)
 @pytest.mark.parametrize("seed", range(3))
 def test_it_decodes_to_what_semantic_and_instances_are(name, seed):
     sample, *_ = random_sample(seed, name, NAMES)

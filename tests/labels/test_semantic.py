@@ -11,7 +11,7 @@ from cube_dataset import make
 from label_scenes import changed, embree, proof, random_sample, rows_of
 from proven import told
 from quick import quick
-from truth_scenes import LENSES, cube, lens, mesh_of, orbit_camera
+from truth_scenes import EVERY, cube, lens, mesh_of, orbit_camera
 from viewsphere.assets.metadata.stuff import stuff_of
 from viewsphere.codecs.palette import palette
 from viewsphere.geometry.rotation import rigid
@@ -39,7 +39,7 @@ from viewsphere_zoo import build_zoo_model, family, family_names
 NAMES = ("depth", "instances", "categories", "semantic")
 
 
-@pytest.mark.parametrize("name", LENSES)
+@pytest.mark.parametrize("name", EVERY)
 @pytest.mark.parametrize("seed", range(3))
 def test_things_ground_scenery_and_sky(name, seed):
     sample, geometry, visibility = random_sample(seed, name, NAMES)
@@ -52,7 +52,7 @@ def test_things_ground_scenery_and_sky(name, seed):
     assert (sample.semantic[rest] == SCENERY).all() and rest.any()
 
 
-@pytest.mark.parametrize("name", LENSES)
+@pytest.mark.parametrize("name", EVERY)
 def test_embree_meets_things_of_these_classes(name):
     pytest.importorskip("embreex")
     sample, geometry, _ = random_sample(3, name, NAMES, ground=False)
@@ -125,7 +125,7 @@ def test_ids_of_stuff_stay_what_they_are_and_leave_room_for_things():
     assert len(set(STUFF.values())) == len(STUFF)
 
 
-@pytest.mark.parametrize("name", LENSES)
+@pytest.mark.parametrize("name", EVERY)
 def test_its_proof_notices_other_classes(name):
     sample, *_ = random_sample(1, name, NAMES)
     assert proof(LABEL, sample) == []

@@ -11,7 +11,7 @@ from label_scenes import changed, pictured, proof, random_camera, random_things,
 from proven import equal, told
 from quick import quick
 from small import small_recipe, tree_hash
-from truth_scenes import LENSES, cube, lens, mesh_of, orbit_camera, sphere
+from truth_scenes import EVERY, cube, lens, mesh_of, orbit_camera, sphere
 from viewsphere import generate, plan
 from viewsphere.assets.mesh import Material
 from viewsphere.check import check
@@ -48,13 +48,13 @@ def seen_cells(sample, grid):
     """The cells in which lifted depth lies, and of each pixel whether rounding may decide in which."""
     rays = pixel_rays(sample.camera.intrinsics)
     hit = np.isfinite(sample.depth)
-    local = rays[hit] / rays[hit][:, 2:] * sample.depth[hit].astype(float)[:, None]
+    local = rays[hit] / rays[hit][:, 2:] * sample.depth[hit].astype(float)[:, None] + sample.camera.lens.origins()[hit]
     at = (np.linalg.inv(grid.world_from_grid) @ np.c_[(local - sample.camera.t) @ sample.camera.R, np.ones(hit.sum())].T).T
     at = at[:, :3] / grid.cell
     return np.floor(at).astype(int), (np.abs(at - np.rint(at)) < 1e-4).any(axis=1), hit
 
 
-@pytest.mark.parametrize("name", LENSES)
+@pytest.mark.parametrize("name", EVERY)
 @pytest.mark.parametrize("seed", range(2))
 def test_seen_surface_is_where_lifted_depth_is(name, seed):
     sample, _ = voxelled(seed, name)
@@ -78,7 +78,7 @@ def test_seen_surface_is_where_lifted_depth_is(name, seed):
     assert np.mean(same) > 0.95  # elsewhere another thing is in the cell, too, but no pixel shows that
 
 
-@pytest.mark.parametrize("name", LENSES)
+@pytest.mark.parametrize("name", EVERY)
 def test_free_cells_are_before_what_is_seen_and_occluded_ones_behind(name):
     sample, _ = voxelled(3, name)
     grid, camera = sample.voxel_grid, sample.camera
@@ -206,7 +206,7 @@ def test_of_a_camera_that_looks_straight_down_or_up_the_picture_s_top_or_bottom_
     np.testing.assert_allclose(grid.world_from_grid[:3, 2], (0.6, 0.8, 0), atol=1e-12)  # right is the picture's right
 
 
-@pytest.mark.parametrize("name", LENSES)
+@pytest.mark.parametrize("name", EVERY)
 def test_its_proof_notices_other_runs(name):
     sample, _ = voxelled(1, name)
     assert proof(LABEL, sample) == []

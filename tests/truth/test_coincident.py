@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from truth_scenes import LENSES, cube, lens, mesh_of, orbit_camera, placed, silhouette
+from truth_scenes import EVERY, cube, lens, mesh_of, orbit_camera, placed, silhouette
 from viewsphere.geometry.camera import orbit_rotation
 from viewsphere.geometry.rotation import compose, rigid
 from viewsphere.truth.raster.visibility import rasterize
@@ -37,7 +37,7 @@ def seen_object(geometry, camera):
 def camera_before(rng, name, normal, middle):
     """A random camera a few metres away that sees a plane of this normal from 75 degrees off it or less."""
     fisheye = name == "fisheye"
-    intrinsics = lens(160, 120, math.radians(120 if fisheye else 40), LENSES[name], skew=rng.uniform(-1, 1))
+    intrinsics = lens(160, 120, math.radians(120 if fisheye else 40), EVERY[name], skew=rng.uniform(-1, 1))
     while True:
         camera = orbit_camera(intrinsics, *rng.uniform(-3, 3, 2), 10 ** rng.uniform(0.3, 1), middle, rng.uniform(-3, 3))
         view = middle - camera.center
@@ -45,7 +45,7 @@ def camera_before(rng, name, normal, middle):
             return camera
 
 
-@pytest.mark.parametrize("name", LENSES)
+@pytest.mark.parametrize("name", EVERY)
 @pytest.mark.parametrize("swapped", [False, True])
 def test_of_two_surfaces_in_one_plane_the_first_is_seen_all_over(name, swapped):
     """Tilted, cut into different triangles, their corners rounded to float32: no camera sees a mixture."""
@@ -75,14 +75,14 @@ def test_a_camera_that_moves_does_not_flip_them():
         assert (on_cube == 1).sum() > 1000
 
 
-@pytest.mark.parametrize("name", LENSES)
+@pytest.mark.parametrize("name", EVERY)
 @pytest.mark.parametrize(("gap", "winner"), [(1e-6, 2), (1e-8, 1)])
 def test_what_is_nearer_by_a_millionth_is_seen(name, gap, winner):
     """A sheet in front of another, later in order, and small and large triangles of it."""
     sheet = mesh_of(*grid((-1, -1), (1, 1), 1, 1))
     fine = mesh_of(*grid((-1, -1), (1, 1), 20, 20))
     fisheye = name == "fisheye"
-    camera = orbit_camera(lens(160, 120, 2.0 if fisheye else 0.8, LENSES[name]), elevation=math.pi / 2, distance=2.0)
+    camera = orbit_camera(lens(160, 120, 2.0 if fisheye else 0.8, EVERY[name]), elevation=math.pi / 2, distance=2.0)
     for front in (sheet, fine):
         move = np.eye(4)
         move[2, 3] = 2.0 * gap
@@ -93,7 +93,7 @@ def test_what_is_nearer_by_a_millionth_is_seen(name, gap, winner):
         assert (seen[both] == winner).all()
 
 
-@pytest.mark.parametrize("name", LENSES)
+@pytest.mark.parametrize("name", EVERY)
 def test_what_lies_in_the_ground_is_seen_before_it(name):
     """From any height above the ground, however low."""
     sheet = mesh_of(*grid((-1, -1), (1, 1), 3, 5))
@@ -101,7 +101,7 @@ def test_what_lies_in_the_ground_is_seen_before_it(name):
         flat = rigid(turned(0.4 + i), (0.37, -0.21, 0.77))
         geometry = placed(sheet, cube(0.25), moves=[flat, rigid(turned(i), (0.9, 0.8, 1.02))], ground=True)
         fov = 2.0 if name == "fisheye" else 1.0
-        camera = orbit_camera(lens(160, 120, fov, LENSES[name]), i, math.asin(height / 4), 4.0, (0.3, 0.0, geometry.ground_z))
+        camera = orbit_camera(lens(160, 120, fov, EVERY[name]), i, math.asin(height / 4), 4.0, (0.3, 0.0, geometry.ground_z))
         assert camera.center[2] > geometry.ground_z
         alone = silhouette(geometry, camera, 1, IMAGE) | silhouette(geometry, camera, 2, IMAGE)
         assert np.array_equal(seen_object(geometry, camera) > 0, alone)

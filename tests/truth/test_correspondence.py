@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from two_views import brute_points, brute_xy, centers, matched, pose, view
 
-from truth_scenes import LENSES, cube, lens, mesh_of, orbit_camera, random_soup, sphere
+from truth_scenes import EVERY, LENSES, cube, lens, mesh_of, orbit_camera, random_soup, sphere
 from viewsphere.geometry.camera import pixel_rays, project
 from viewsphere.geometry.rotation import matrix_from_quaternion
 from viewsphere.model.sensors.camera import Camera
@@ -77,7 +77,7 @@ def test_a_camera_that_orbits_and_zooms():
 @pytest.mark.parametrize("name", LENSES)
 def test_the_sky_turns_and_does_not_move(name):
     fov = 3.0 if name == "fisheye" else 1.2
-    first, second = lens(96, 72, fov, LENSES[name]), lens(96, 72, 0.9 * fov, LENSES[name])
+    first, second = lens(96, 72, fov, EVERY[name]), lens(96, 72, 0.9 * fov, EVERY[name])
     turn = turned(np.random.default_rng(3), 0.1)
     here = view([], [], at(first))
     there = view([], [], at(second, (100.0, -30.0, 2.0), turn @ AHEAD))
@@ -106,11 +106,11 @@ def bar(bend):
     return mesh_of(posed, np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]]))
 
 
-@pytest.mark.parametrize("name", LENSES)
+@pytest.mark.parametrize("name", EVERY)
 @pytest.mark.parametrize("moves", [False, True])
 def test_a_skinned_bar_moves_with_its_triangles(name, moves):
     rng = np.random.default_rng(5)
-    camera = orbit_camera(lens(96, 72, 2.0 if name == "fisheye" else 0.8, LENSES[name]), 0.2, 0.3, 3.0)
+    camera = orbit_camera(lens(96, 72, 2.0 if name == "fisheye" else 0.8, EVERY[name]), 0.2, 0.3, 3.0)
     after = pose(0.1, -0.2, 0.3, turn=turned(rng, 0.1)) if moves else STILL
     here = view([bar(0.0)], [STILL], camera, steps=[1])
     there = view([bar(0.5)], [after], camera, steps=[2])
@@ -175,6 +175,19 @@ def test_what_does_not_move_has_no_flow_at_all():
         assert (match.scene_flow[(owners == 0) | (owners == 2)] == 0).all()
 
 
+def test_nothing_moves_before_parallel_rays_at_rest_and_their_sky_has_no_place():
+    """All pixels show one direction of the sky, so none of them is its place in the other picture."""
+    camera = orbit_camera(lens(64, 48, 1.1, EVERY["orthographic"]), 1.0, -0.1, 4.0, tilt=0.2)
+    where = pose(1.3, 0.4, 0.1, turn=turned(np.random.default_rng(0)))
+    here, there = (view([cube(0.6), sphere(2, 0.5)], [where, at], camera) for at in (STILL, pose(0, 0, 2)))
+    match = matched(here, there)
+    owners = np.append(here.owners, 9)[match.visibility.triangle]
+    assert set(np.unique(owners)) == {0, 1, 9}
+    assert (match.flow[owners == 0] == 0).all() and (match.scene_flow[owners == 0] == 0).all()
+    assert np.isnan(match.flow[owners == 9]).all() and (match.state[owners == 9] == 4).all()
+    assert (match.flow[owners == 1] != 0).any()
+
+
 def test_only_what_moves_differs_where_the_camera_only_moves():
     """Disparity's picture rows are exactly one's own."""
     first = at(lens(64, 48, 1.0))
@@ -190,8 +203,8 @@ def random_scene(rng, count=3):
     return meshes, first, second
 
 
-@pytest.mark.parametrize("name", LENSES)
-@pytest.mark.parametrize("other", LENSES)
+@pytest.mark.parametrize("name", EVERY)
+@pytest.mark.parametrize("other", EVERY)
 def test_any_motion_between_any_lenses_is_that_of_brute_force(name, other):
     """Things and cameras move at random; the ground stays, and meets nobody's triangles."""
     rng = np.random.default_rng(sum(map(ord, name + other)))
@@ -199,7 +212,7 @@ def test_any_motion_between_any_lenses_is_that_of_brute_force(name, other):
         meshes, first, second = random_scene(rng)
         cameras = [
             orbit_camera(
-                lens(56, 42, rng.uniform(1.5, 3.2) if which == "fisheye" else rng.uniform(0.5, 1.2), LENSES[which]),
+                lens(56, 42, rng.uniform(1.5, 3.2) if which == "fisheye" else rng.uniform(0.5, 1.2), EVERY[which]),
                 rng.uniform(0, 6), rng.uniform(-0.3, 1), rng.uniform(2, 6), rng.normal(size=3) * 0.3, rng.uniform(-1, 1),
             )
             for which in (name, other)
@@ -252,14 +265,14 @@ def test_a_flat_picture_is_nowhere_and_a_ground_of_another_height_is_another():
     assert (np.isnan(match.xy[..., 0]) == (match.state == 4)).all()
 
 
-@pytest.mark.parametrize("name", LENSES)
+@pytest.mark.parametrize("name", EVERY)
 def test_forward_and_backward_agree(name):
     """|f(p) + b(p + f(p))| where the point is seen in both pictures; b is evaluated from geometry, at any position."""
     from viewsphere.truth.surface_points.points import points_seen
 
     rng = np.random.default_rng(8)
     meshes, first, second = random_scene(rng)
-    intrinsics = lens(80, 60, 2.8 if name == "fisheye" else 0.9, LENSES[name])
+    intrinsics = lens(80, 60, 2.8 if name == "fisheye" else 0.9, EVERY[name])
     cameras = orbit_camera(intrinsics, 0.3, 0.4, 4.0), orbit_camera(intrinsics, 0.4, 0.35, 4.1)
     here, there = (view(meshes, poses, c, ground=True, floor=-3.0) for poses, c in zip((first, second), cameras, strict=True))
     match = matched(here, there)
@@ -271,14 +284,14 @@ def test_forward_and_backward_agree(name):
     assert np.median(off) < 1e-9
 
 
-@pytest.mark.parametrize("name", LENSES)
+@pytest.mark.parametrize("name", EVERY)
 def test_flow_is_the_way_from_the_pixels_centers(name):
     rng = np.random.default_rng(5)
     here, there = (
         view(
             [cube(0.4), sphere(2, 0.5)],
             [pose(-0.6, 4, 0, turn=turned(rng)), pose(0.5, 3, 0.1)],
-            at(lens(96, 72, 1.0, LENSES[name]), (x, 0, 0)),
+            at(lens(96, 72, 1.0, EVERY[name]), (x, 0, 0)),
         )
         for x in (0.0, 0.2)
     )

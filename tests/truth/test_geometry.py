@@ -3,7 +3,7 @@ import math
 import numpy as np
 import pytest
 
-from truth_scenes import LENSES, cube, lens, mesh_of, orbit_camera, placed
+from truth_scenes import EVERY, cube, lens, mesh_of, orbit_camera, placed
 from viewsphere.assets.mesh import Image, Material, Texture
 from viewsphere.labels import observe
 from viewsphere.truth.raster.alpha_masks import NEVER, SURFACE
@@ -187,14 +187,14 @@ def test_which_triangles_need_the_test_at_all():
         assert seen_head_on(card(material, image)).all() == (expected == SURFACE)
 
 
-@pytest.mark.parametrize("name", LENSES)
+@pytest.mark.parametrize("name", EVERY)
 def test_behind_a_hole_is_the_next_surface(name):
     image, _ = grid(np.random.default_rng(6), 16, 16)
     front = card(Material(alpha_mode="MASK", base_color_texture=Texture(0)), image)
     back = np.eye(4)
     back[1, 3] = 1.0
     geometry = placed(front, cube(0.8), front, moves=[np.eye(4), back, back], label_alpha=0.5)
-    camera = orbit_camera(lens(64, 64, 1.0, LENSES[name]), 0.1, 0.05, 3.0)
+    camera = orbit_camera(lens(64, 64, 1.0, EVERY[name]), 0.1, 0.05, 3.0)
     both = rasterize(geometry, camera)
     alone = {i: rasterize(geometry, camera, object_id=i) for i in (1, 2, 3)}
     nearest = np.max([a.inverse_depth for a in alone.values()], axis=0)

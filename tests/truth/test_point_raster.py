@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from two_views import brute_hidden, brute_points, centers, expected_states, matched, pose, thing, view
 
-from truth_scenes import LENSES, cube, lens, mesh_of, orbit_camera, random_soup, sphere
+from truth_scenes import EVERY, LENSES, cube, lens, mesh_of, orbit_camera, random_soup, sphere
 from viewsphere.assets.mesh import Material
 from viewsphere.geometry.rotation import matrix_from_quaternion
 from viewsphere.model.sensors.camera import Camera
@@ -28,12 +28,12 @@ def random_camera(rng, name, width=64, height=48):
     fov = rng.uniform(1.5, 3.4) if name == "fisheye" else rng.uniform(0.5, 1.3)
     tilt = rng.uniform(-1, 1)
     return orbit_camera(
-        lens(width, height, fov, LENSES[name]), rng.uniform(0, 6), rng.uniform(-0.3, 1.2), rng.uniform(0.5, 6),
+        lens(width, height, fov, EVERY[name]), rng.uniform(0, 6), rng.uniform(-0.3, 1.2), rng.uniform(0.5, 6),
         rng.normal(size=3) * 0.3, tilt,
     )  # fmt: skip
 
 
-@pytest.mark.parametrize("name", LENSES)
+@pytest.mark.parametrize("name", EVERY)
 def test_states_of_random_points_are_those_of_brute_force(name):
     """Points on things of all sizes, some around the camera; in front, behind, beside, below the ground's horizon."""
     rng = np.random.default_rng(sum(map(ord, name)))
@@ -54,7 +54,7 @@ def test_states_of_random_points_are_those_of_brute_force(name):
     assert (found[:4] > 50).all() and found[INVALID] == 0
 
 
-@pytest.mark.parametrize("name", LENSES)
+@pytest.mark.parametrize("name", EVERY)
 def test_states_of_pixels_are_those_of_brute_force(name):
     rng = np.random.default_rng(sum(map(ord, name)) + 1)
     for _ in range(4):
@@ -78,7 +78,7 @@ def test_states_of_pixels_are_those_of_brute_force(name):
 @pytest.mark.parametrize("name", LENSES)
 def test_the_sky_is_hidden_by_whatever_is_in_front(name):
     """A sky's point is seen exactly where the other picture shows the sky: at pixel centres that is what it shows."""
-    camera = orbit_camera(lens(64, 48, 2.6 if name == "fisheye" else 1.1, LENSES[name]), 0.3, 0.15, 4.0)
+    camera = orbit_camera(lens(64, 48, 2.6 if name == "fisheye" else 1.1, EVERY[name]), 0.3, 0.15, 4.0)
     empty, full = (
         view([], [], camera),
         view([cube(0.7), sphere(2, 0.6)], [pose(1, 0, 0), pose(-1, 0.5, 0)], camera, ground=True),
@@ -121,7 +121,7 @@ def holed():
 @pytest.mark.parametrize("name", LENSES)
 def test_cut_outs_hide_where_they_are_surface(name):
     """Alpha rises from 0 at the left to 1 in the middle, so surface begins at x = -0.5."""
-    camera = orbit_camera(lens(64, 48, 2.0 if name == "fisheye" else 0.9, LENSES[name]), 0.0, 0.0, 4.0)
+    camera = orbit_camera(lens(64, 48, 2.0 if name == "fisheye" else 0.9, EVERY[name]), 0.0, 0.0, 4.0)
     there = view([holed()], [pose(0, 0, 0)], camera)
     assert (there.geometry.triangle_cutout >= 0).any()
     rng = np.random.default_rng(0)
@@ -169,7 +169,7 @@ def test_a_point_just_behind_a_surface_is_hidden_from_a_millionth_on():
 @pytest.mark.parametrize("name", LENSES)
 def test_where_no_mesh_is_the_ground_hides_what_is_below_and_nothing_what_is_not(name):
     """A small cube far from all points, which are above the ground and below it, ahead and in the sky."""
-    camera = orbit_camera(lens(64, 48, 2.0 if name == "fisheye" else 1.0, LENSES[name]), 0.0, 0.3, 6.0)
+    camera = orbit_camera(lens(64, 48, 2.0 if name == "fisheye" else 1.0, EVERY[name]), 0.0, 0.3, 6.0)
     rng = np.random.default_rng(5)
     aside = pose(0, 40, 0)
     with_ground, without = (view([cube(0.1)], [aside], camera, ground=ground, floor=-1.0) for ground in (True, False))

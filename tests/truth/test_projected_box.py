@@ -8,12 +8,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from quick import quick
-from truth_scenes import LENSES, cube, lens, mesh_of, orbit_camera, placed, random_soup, silhouette, sphere
+from truth_scenes import EVERY, cube, lens, mesh_of, orbit_camera, placed, random_soup, silhouette, sphere
 from viewsphere.geometry.box import projected_bounds
 from viewsphere.geometry.lenses import lens_parameters
 
 STRONG = {
-    **LENSES,
+    **EVERY,
     "folding": lens_parameters("brown_conrady", coefficients=(-0.3, 0.0, 0.0, 0.0)),
     "shifted": lens_parameters("brown_conrady", coefficients=(-0.45, 0.25, 0.01, -0.015, -0.02)),
     "equidistant": lens_parameters("fisheye", coefficients=(0.0, 0.0, 0.0, 0.0)),

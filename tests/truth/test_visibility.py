@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from truth_scenes import LENSES, cast, cube, lens, mesh_of, orbit_camera, placed, random_soup, silhouette, sphere
+from truth_scenes import EVERY, LENSES, cast, cube, lens, mesh_of, orbit_camera, placed, random_soup, silhouette, sphere
 from viewsphere.geometry.camera import pixel_rays
 from viewsphere.model.sensors.camera import Camera
 from viewsphere.truth.raster.visibility import rasterize
@@ -18,14 +18,14 @@ def depth_of(visibility):
         return 1.0 / visibility.inverse_depth.astype(np.float64)
 
 
-@pytest.mark.parametrize("name", LENSES)
+@pytest.mark.parametrize("name", EVERY)
 @EXACT
 @given(seed=st.integers(0, 10**6))
 def test_equals_brute_force_on_soups(name, seed):
     rng = np.random.default_rng(seed)
     geometry = placed(random_soup(rng, 40), random_soup(rng, 40), ground=bool(rng.integers(2)))
     fov = math.radians(rng.uniform(20, 100) if name != "fisheye" else rng.uniform(100, 250))
-    intrinsics = lens(40, 32, fov, LENSES[name], cx=rng.uniform(10, 30), cy=rng.uniform(10, 24), skew=rng.uniform(-2, 2))
+    intrinsics = lens(40, 32, fov, EVERY[name], cx=rng.uniform(10, 30), cy=rng.uniform(10, 24), skew=rng.uniform(-2, 2))
     distance = 10 ** rng.uniform(-1, 1)  # often inside the soup
     camera = orbit_camera(intrinsics, *rng.uniform(-3, 3, 2), distance, tilt=rng.uniform(-1, 1))
     triangle, s, margin, gap = cast(geometry, camera)
@@ -55,7 +55,7 @@ def test_pinhole_and_ray_table_agree():
 def test_tilted_plane_depth_is_exact(name):
     quad = mesh_of([[-50, 3, -50], [50, 9, -50], [50, 9, 50], [-50, 3, 50]], [[0, 1, 2], [0, 2, 3]])
     geometry = placed(quad)
-    camera = Camera(lens(64, 48, 0.9, LENSES[name]), orbit_camera(lens(), 0, 0).R, np.zeros(3))
+    camera = Camera(lens(64, 48, 0.9, EVERY[name]), orbit_camera(lens(), 0, 0).R, np.zeros(3))
     seen = rasterize(geometry, camera)
     rays = pixel_rays(camera.intrinsics)
     normal = np.array([-0.06, 0.0, 1.0])  # y = 6 + .06 x in the world is z = 6 + .06 x in the camera
@@ -79,7 +79,7 @@ def test_cube_faces_and_corner_depths():
 def test_ball(name):
     radius, distance = 1.0, 4.0
     ball = sphere(5, radius)
-    camera = orbit_camera(lens(160, 120, 0.8, LENSES[name]), 0.4, 0.7, distance, tilt=0.3)
+    camera = orbit_camera(lens(160, 120, 0.8, EVERY[name]), 0.4, 0.7, distance, tilt=0.3)
     seen = rasterize(placed(ball), camera)
     d = pixel_rays(camera.intrinsics)
     d = d / np.linalg.norm(d, axis=-1, keepdims=True)
@@ -103,7 +103,7 @@ def test_ball(name):
 @pytest.mark.parametrize("elevation", [0.0, math.pi / 2, -math.pi / 2])
 def test_from_inside_a_ball_every_pixel_is_surface(name, elevation):
     fov = 2.0 if name == "pinhole" else 1.3 if name != "fisheye" else 4.4
-    camera = orbit_camera(lens(96, 96, fov, LENSES[name]), 0.3, elevation, 0.7)
+    camera = orbit_camera(lens(96, 96, fov, EVERY[name]), 0.3, elevation, 0.7)
     seen = rasterize(placed(sphere(3)), camera)
     rays = pixel_rays(camera.intrinsics)
     real = np.isfinite(rays[..., 0])
@@ -140,11 +140,11 @@ def test_nothing_is_too_near():
     assert (rasterize(behind, at_origin).triangle == -1).all()
 
 
-@pytest.mark.parametrize("name", LENSES)
+@pytest.mark.parametrize("name", EVERY)
 def test_first_of_equal_surfaces_wins(name):
     quad = mesh_of([[-1, 0, -1], [1, 0, -1], [1, 0, 1], [-1, 0, 1]], [[0, 1, 2], [0, 2, 3]])
     geometry = placed(quad, quad, quad)
-    seen = rasterize(geometry, orbit_camera(lens(distortion=LENSES[name]), distance=2.0))
+    seen = rasterize(geometry, orbit_camera(lens(distortion=EVERY[name]), distance=2.0))
     assert set(np.unique(seen.triangle)) <= {-1, 0, 1}
 
 
@@ -161,7 +161,7 @@ def test_watertight(name, seed):
     move[:3, 3] = rng.normal(size=3) * 10 ** rng.uniform(-2, 4)
     closed = mesh_of(ball.vertices * scale * squash, ball.triangles)
     fov = 1.5 if name != "fisheye" else 5.0
-    intrinsics = lens(96, 64, fov, LENSES[name])
+    intrinsics = lens(96, 64, fov, EVERY[name])
     camera = orbit_camera(intrinsics, *rng.uniform(-3, 3, 2), 0.2 * squash.min(), move[:3, 3], rng.uniform(-3, 3))
     real = np.isfinite(pixel_rays(intrinsics)[..., 0])
     assert np.array_equal(rasterize(placed(closed, moves=[move]), camera).triangle >= 0, real)
@@ -208,13 +208,13 @@ def test_subdivision_samples_the_quarters_of_pixels():
     assert np.array_equal(odd.triangle[1::3, 1::3], rasterize(geometry, orbit_camera(half, 0.2, 0.3, 4)).triangle)
 
 
-@pytest.mark.parametrize("name", LENSES)
+@pytest.mark.parametrize("name", EVERY)
 def test_silhouette_agrees_with_the_picture_and_goes_beyond_it(name):
     ball = sphere(3)
     move = np.eye(4)
     move[:3, 3] = 0.6, 0.2, 0.5
     geometry = placed(ball, cube(0.4), moves=[np.eye(4), move], ground=True)
-    camera = orbit_camera(lens(80, 60, 0.5, LENSES[name]), 0.3, 0.2, 4.0)
+    camera = orbit_camera(lens(80, 60, 0.5, EVERY[name]), 0.3, 0.2, 4.0)
     seen = rasterize(geometry, camera)
     objects = np.where(seen.triangle >= 0, geometry.triangle_object[seen.triangle], 0)
     wide = (-80, -60, 160, 120)

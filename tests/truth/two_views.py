@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from truth_scenes import cast, least_weight
+from truth_scenes import begins, cast, least_weight
 from viewsphere.geometry.camera import pixel_rays, project
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.scene import Floor
@@ -56,7 +56,8 @@ def brute_points(here, there):
     """
     triangle, s, margin, gap = cast(here.geometry, here.camera)
     rays = pixel_rays(here.camera.intrinsics)
-    world = here.camera.center + (np.where(triangle < 0, 1.0, s)[..., None] * np.nan_to_num(rays)) @ here.camera.R
+    there_s = np.where(triangle < 0, 1.0, s)[..., None]
+    world = here.camera.center + (here.camera.lens.origins() + there_s * np.nan_to_num(rays)) @ here.camera.R
     seen = (triangle >= 0) & (triangle < here.geometry.triangle_start[-1])
     corners = here.geometry.vertices[here.geometry.triangles[triangle[seen]]]
     moved = there.geometry.vertices[there.geometry.triangles[triangle[seen]]]
@@ -90,14 +91,16 @@ def brute_hidden(there, world, own, chunk=512):
     """Whether each point (N, 3) is hidden in a view, and the least of |weights| and of |gap - 1e-6| over all triangles: where
     this is tiny, rounding decides. `own` (N,): the triangle left out; of the ground both of its halves are.
     """
-    geometry, center = there.geometry, there.camera.center
-    a, b, c = (geometry.vertices[geometry.triangles[:, k]] - center for k in range(3))
-    e1, e2 = b - a, c - a
-    number = np.minimum(np.arange(len(a)), geometry.triangle_start[-1])
+    geometry = there.geometry
+    begin = begins(there.camera, world)
+    corner, b, c = (geometry.vertices[geometry.triangles[:, k]] for k in range(3))
+    e1, e2 = b - corner, c - corner
+    number = np.minimum(np.arange(len(corner)), geometry.triangle_start[-1])
     hidden, doubt = np.zeros(len(world), bool), np.full(len(world), np.inf)
     with np.errstate(all="ignore"):
         for i in range(0, len(world), chunk):
-            d = (world[i : i + chunk] - center)[:, None]
+            center = begin[i : i + chunk]
+            d, a = (world[i : i + chunk] - center)[:, None], corner - center[:, None]
             p = np.cross(d, e2)
             det = (p * e1).sum(-1)
             u = -(p * a).sum(-1) / det

@@ -106,6 +106,7 @@ preparer, writer, verify = functions(_CocoPanoptic)
 
 
 FORMAT = FormatSpec(
+    parallel_rays=True,
     about=__doc__,
     holds=("panoptic masks", "boxes"),
     read_by=("panopticapi", "datumaro"),

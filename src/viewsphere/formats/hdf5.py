@@ -184,6 +184,7 @@ preparer, writer, verify = functions(_Hdf5)
 
 
 FORMAT = FormatSpec(
+    parallel_rays=True,
     about=__doc__,
     holds=("pictures", "depth", "normals", "masks", "NOCS", "flow", "poses", "cameras"),
     read_by=("h5py", "BlenderProc"),

@@ -117,6 +117,7 @@ def _content(sample: Sample, options: _Options) -> bytes:
 
 
 FORMAT = FormatSpec(
+    parallel_rays=True,
     about=__doc__,
     holds=("coloured points", "normals", "objects"),
     read_by=("Open3D", "trimesh", "MeshLab", "CloudCompare"),

@@ -182,6 +182,7 @@ def _npy(array: NDArray[Any]) -> bytes:
 
 
 FORMAT = FormatSpec(
+    parallel_rays=True,
     about=__doc__,
     holds=("everything",),
     read_by=("webdataset", "wids"),

@@ -67,7 +67,7 @@ def _prove(sample: Sample, models: Models) -> Iterator[str]:
             yield f"object {o.id}: expected the visible box in the projected one, found {tight} and {around}"
         if unclipped and around != _clipped(unclipped, sample.camera):
             yield f"object {o.id}: expected box2d_projected to be the clipped {unclipped}, found {around}"
-        if unclipped and sample.camera.lens.is_linear and o.box3d_in_front.all():
+        if unclipped and sample.camera.lens.is_straight and o.box3d_in_front.all():
             x, y = o.box3d_pixels.T
             if not _within(unclipped, (x.min(), y.min(), x.max(), y.max()), 1e-3):
                 yield f"object {o.id}: expected box2d_unclipped within the projected 3D box, found {unclipped}"

@@ -58,11 +58,11 @@ def _projected(sample: Sample, o: ObjectAnnotation) -> Iterator[str]:
     """Check box3d_pixels against P, written out here; a distorted lens has no P, so `project` replaces it."""
     camera = sample.camera
     homogeneous = np.column_stack([o.box3d, np.ones(8)]) @ camera.P.T
-    in_front = homogeneous[:, 2] > 0
+    in_front = (o.box3d @ camera.R[2] + camera.t[2] if camera.lens.is_parallel else homogeneous[:, 2]) > 0
     if not np.array_equal(in_front, o.box3d_in_front):
         yield f"object {o.id}: expected vertices in front {in_front.tolist()}, found {o.box3d_in_front.tolist()}"
         return
-    if camera.lens.is_linear:
+    if camera.lens.is_straight:
         expected = np.full((8, 2), np.nan)
         expected[in_front] = homogeneous[in_front, :2] / homogeneous[in_front, 2:]
     else:

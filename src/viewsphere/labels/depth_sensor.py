@@ -21,6 +21,7 @@ from viewsphere.model.sample import Sample
 
 if TYPE_CHECKING:
     from viewsphere.labels.shared.context import LabelContext
+    from viewsphere.model.sensors.camera import Intrinsics
 
 Float = NDArray[np.float64]
 Draw = Callable[[str], Float]
@@ -81,6 +82,15 @@ def _compute(context: LabelContext) -> NDArray[np.float32]:
     if options.failures:
         hole |= draw("failures") < _quantile(options.failures)
     return np.where(hole, np.inf, out).astype(np.float32)
+
+
+def _refuses(intrinsics: Intrinsics) -> str | None:
+    """The reason why no range camera has this lens; None if one may."""
+    if not intrinsics.lens.is_parallel:
+        return None
+    return (
+        f"expected a lens whose rays pass through one centre, as range cameras have; found {intrinsics.lens.name}: leave it out"
+    )
 
 
 def _seen(context: LabelContext) -> tuple[Float, Float]:
@@ -169,6 +179,7 @@ LABEL = ChannelLabel(
     meaning="depth as a depth camera measures it, with noise, steps and holes",
     axes="camera",
     needs=(Randomness(),),
+    refuses=_refuses,
     options=_Options,
     dtype=np.float32,
     unit="m",

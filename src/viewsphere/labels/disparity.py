@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from viewsphere.labels.shared.needs import Partner
+from viewsphere.labels.shared.needs import Partner, no_disparity
 from viewsphere.labels.shared.spec import ChannelLabel, Drawing, Extent, Models, Picture, channel_of
 from viewsphere.model.sample import Sample
 
@@ -64,6 +64,7 @@ LABEL = ChannelLabel(
     meaning="x in the left picture less x in the right one, of the rectified pair",
     axes="image",
     needs=(Partner(),),
+    refuses=no_disparity,
     dtype=np.float32,
     unit="px",
     empty=np.nan,

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from viewsphere.labels.shared.needs import Next, Partner
+from viewsphere.labels.shared.needs import Next, Partner, no_disparity
 from viewsphere.labels.shared.spec import ChannelLabel, Drawing, Extent, Models, Picture, channel_of
 from viewsphere.model.sample import Sample
 from viewsphere.truth.surface_points.raster import in_lens
@@ -62,6 +62,7 @@ LABEL = ChannelLabel(
     meaning="the seen point's disparity one instant later, less its disparity",
     axes="image",
     needs=(Next(), Partner()),
+    refuses=no_disparity,
     dtype=np.float32,
     unit="px",
     empty=np.nan,

@@ -19,6 +19,7 @@ from viewsphere.labels.shared.spec import Drawing, Models, ObjectLabel, rendered
 from viewsphere.model.fields.frozen import Frozen
 from viewsphere.model.fields.numbers import Number
 from viewsphere.model.sample import ObjectAnnotation, Sample
+from viewsphere.model.sensors.camera import Camera
 from viewsphere.truth.surface_points.points import points_in_world
 from viewsphere.truth.surface_points.raster import BEHIND, OCCLUDED, OUTSIDE, VISIBLE
 
@@ -64,20 +65,29 @@ def _states(context: LabelContext) -> dict[int, tuple[int, ...]]:
     if view is None:
         raise ValueError("keypoints: expected a sample of a shot, found none")
     found, places = dict[int, int](), list[Float]()
-    center = context.camera.center
     for i, placement in enumerate(context.placements):
         if placement is not None:
-            away = _in_world(placement) - center
+            points = _in_world(placement)
+            begin = _ray_origins(context.camera, points)
+            away = points - begin
             distance = np.sqrt((away * away).sum(axis=1))
             least = np.minimum(slack * (placement.facts.diameter or 0.0), NEAREST * distance)
             share = np.divide(least, distance, out=np.zeros_like(distance), where=distance > 0)
-            places.append(center + away * (1 - share)[:, None])
+            places.append(begin + away * (1 - share)[:, None])
             found[i] = len(away)
     if not places:
         return {}
     states: list[int] = points_in_world(np.concatenate(places)).in_view(view).state.tolist() if sum(found.values()) else []
     ends = np.cumsum([*found.values()]).tolist()
     return {i: tuple(states[end - count : end]) for (i, count), end in zip(found.items(), ends, strict=True)}
+
+
+def _ray_origins(camera: Camera, points: Float) -> Float:
+    """Places in the world where the rays to points (N, 3) begin, (3,) or (N, 3)."""
+    if not camera.lens.is_parallel:
+        return camera.center
+    ahead = transform(camera.R, points) + camera.t
+    return points - ahead[:, 2:] * camera.R[2]
 
 
 def _in_object(placement: Placement) -> Float:

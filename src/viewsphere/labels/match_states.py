@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from viewsphere.labels.shared.needs import Next, Partner, Previous
+from viewsphere.labels.shared.needs import Next, Partner, Previous, no_disparity
 from viewsphere.labels.shared.spec import ChannelLabel, Drawing, Models, Picture, channel_of
 from viewsphere.model.sample import Sample
 from viewsphere.truth.surface_points.raster import INVALID
@@ -54,6 +54,7 @@ def _label(name: str, where: str, other: Next | Previous | Partner) -> ChannelLa
         name=name,
         meaning=f"the seen point {where}: {MEANING}",
         needs=(other,),
+        refuses=no_disparity if isinstance(other, Partner) else None,
         dtype=np.uint8,
         ids={},
         empty=4,

@@ -29,8 +29,8 @@ def _compute(context: LabelContext) -> NDArray[np.float32]:
 
     out, world_from_camera = context.empty(np.float32, 3), inverse(context.camera.R)
     center = -transform(world_from_camera, context.camera.t)
-    world_from_ray = product(world_from_camera, context.camera_from_ray)
-    kernels.positions(context.visibility.inverse_depth, context.rays, world_from_ray, center, out)
+    world_from_ray = product(world_from_camera, context.camera_from_ray_to)
+    kernels.positions(context.visibility.inverse_depth, context.rays_to, world_from_ray, center, out)
     return out
 
 

@@ -19,7 +19,10 @@ TOLERANCE = 1e-6
 def _prove(sample: Sample, models: Models) -> Iterator[str]:
     """Azimuth, elevation and distance lead from the object to the camera."""
     for o in rendered(sample):
-        center = o.camera_from_object[:3, :3].T @ -o.camera_from_object[:3, 3] - o.box3d_object.mean(axis=0)
+        middle = o.box3d_object.mean(axis=0)
+        center = o.camera_from_object[:3, :3].T @ -o.camera_from_object[:3, 3] - middle
+        if sample.known_camera is not None and sample.camera.lens.is_parallel:
+            center = o.camera_from_object[2, :3] * (o.camera_from_object[2, :3] @ center)
         view = o.view
         seen = orbit_center(math.radians(view.azimuth_deg), math.radians(view.elevation_deg), view.distance)
         if not np.allclose(center, seen, rtol=0, atol=TOLERANCE * (1 + view.distance)):

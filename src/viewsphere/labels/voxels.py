@@ -185,9 +185,9 @@ def _along(camera: Camera, points: Float) -> Float:
 def _seen_cells(context: LabelContext, grid: Grid) -> tuple[Rows, tuple[Rows, Rows]]:
     """The cells of the points at pixels, as indices into flat arrays, and these pixels; without points outside the grid."""
     where = np.nonzero(context.visibility.inverse_depth > 0)
-    rays = pixel_rays(context.camera.intrinsics)[where]
+    rays, begin = pixel_rays(context.camera.intrinsics)[where], context.camera.lens.origins()[where]
     depth = 1.0 / context.visibility.inverse_depth[where].astype(np.float64)
-    cells = np.floor(_lifted(context.camera, grid, rays * depth[:, None]))
+    cells = np.floor(_lifted(context.camera, grid, begin + rays * depth[:, None]))
     inside = ((cells >= 0) & (cells < grid.size)).all(axis=1)
     i, j, k = cells[inside].astype(np.int64).T
     return (i * grid.size[1] + j) * grid.size[2] + k, (where[0][inside], where[1][inside])
@@ -250,7 +250,7 @@ def _wrong_surface(sample: Sample, cells: VoxelGrid) -> Iterator[str]:
         return
     rays = pixel_rays(sample.camera.intrinsics)
     seen = np.logical_and(np.isfinite(depth), rays[..., 2] != 0)
-    lifted = rays[seen] * (depth[seen].astype(np.float64) / rays[seen][:, 2])[:, None]
+    lifted = rays[seen] * (depth[seen].astype(np.float64) / rays[seen][:, 2])[:, None] + sample.camera.lens.origins()[seen]
     points = _lifted(sample.camera, grid, lifted)
     slack = (ROUNDING * (largest(lifted) + np.abs(sample.camera.center).max()) / grid.cell)[:, None]
     sure = (np.abs(points - np.rint(points)) > slack).all(axis=1)

@@ -36,6 +36,7 @@ from viewsphere.model.scene import IDENTITY, Floor
 from viewsphere.model.sensors.rig import Rig
 from viewsphere.model.shot import Shot
 from viewsphere.model.thing import Motion, Thing
+from viewsphere.planning.checks.lenses import check_fill, check_lenses
 from viewsphere.planning.checks.models import (
     check_all_frames,
     check_blend,
@@ -464,8 +465,11 @@ def plan(recipe: Recipe | str | PathLike[str], shot_frames: int | None = None) -
         check_redraws(recipe)
         check_motions(recipe)
         views = poses_of(recipe.viewpoints, recipe.time, recipe.seed, recipe.folder)
-        rig = rig_of(recipe, lens(recipe, views))
-        check_panoramas(recipe, rig or Rig.single(lens(recipe, views)))
+        own = lens(recipe, views)
+        rig = rig_of(recipe, own)
+        check_panoramas(recipe, rig or Rig.single(own))
+        check_lenses(recipe, rig or Rig.single(own))
+        check_fill(recipe, rig or Rig.single(own), views)
         check_frames(recipe, views)
         found = numbered_specs(recipe)
         numbered = tuple((spec, number) for spec, number in found if spec.category_id)
@@ -591,7 +595,8 @@ def _moved(context: SamplingContext, subject: str, shot: Shot, i: int) -> Instan
         return now
     right, down = context.scenes.jitter(subject, context.jitter_name(view.index)).off_center
     pose = np.array(now.world_from_rig)
-    x, y = -right * lens.width * view.distance / lens.fx, -down * lens.height * view.distance / lens.fy
+    away = 1.0 if lens.lens.is_parallel else view.distance
+    x, y = -right * lens.width * away / lens.fx, -down * lens.height * away / lens.fy
     by = x * pose[:3, 0] + y * pose[:3, 1]
     pose[:3, 3] += by
     target = tuple((np.array(view.target or now.focus) + by).tolist())

@@ -18,6 +18,7 @@ from viewsphere.model.scene import IDENTITY, Matrix4
 from viewsphere.model.sensors.camera import Intrinsics
 from viewsphere.model.sensors.lidar import LIDAR, Lidar
 from viewsphere.model.sensors.rig import Rig, Sensor
+from viewsphere.planning.checks.lenses import check_lenses
 from viewsphere.planning.rig_files import Calibrated, read_rig
 from viewsphere.recipe.cameras.rig import RigFile, SensorEntry, SensorList, StereoRig, SurroundRig
 from viewsphere.recipe.recipe import Recipe
@@ -47,6 +48,7 @@ def rig_of(recipe: Recipe, lens: Intrinsics) -> Rig | None:
             rig = _listed(recipe, recipe.rig, lens)
         case RigFile():
             rig = _calibrated(recipe, recipe.rig, lens)
+    check_lenses(recipe, rig)
     _check_disparity(recipe, rig)
     if rig.sensors[0].lidar and (recipe.camera.is_random or recipe.camera.of_viewpoints):
         raise RecipeError(

@@ -33,6 +33,9 @@ class EngineSpec(Spec):
     paints: tuple[str, ...] = Field(default=PICTURES, description="the passes that it paints")
     opens_scenes: bool = Field(default=False, description="whether it renders .blend files that are the scene (`scene.blend`)")
     catches_shadows: bool = Field(default=True, description="whether the ground may be a shadow catcher")
+    parallel_rays: bool = Field(
+        default=False, description="whether it paints lenses whose rays are parallel instead of passing through one centre"
+    )
     programs: tuple[Path, ...] = Field(
         default=(), description="files and folders besides its module whose sources decide what its pictures look like"
     )

@@ -51,6 +51,10 @@ class FormatSpec(SpecWithOptions):
         description="whether boxes may reach across the seam of a full turn; False: samples have such an object as two, with "
         "one id and `seam_piece` 1 and 2 in `extra`",
     )
+    parallel_rays: bool = Field(
+        default=False,
+        description="whether it holds pictures whose rays are parallel: it stores no cameras, or also the kind of lens",
+    )
     refuses: Annotated[Callable[..., Iterator[str]] | None, Takes(1)] = Field(
         default=None,
         description="the parts of a `viewsphere.formats.Scope` that the format cannot hold, as `expected ...; found ...`",

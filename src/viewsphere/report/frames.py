@@ -48,6 +48,7 @@ def _camera_data(camera: Camera) -> dict[str, Any]:
     return {
         "K": [numbers(row) for row in camera.K],
         "distortion": None if camera.lens.is_linear else camera.lens.name,
+        "parallel": camera.lens.is_parallel,
         "center": numbers(camera.center),
     }
 

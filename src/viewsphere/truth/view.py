@@ -10,12 +10,11 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from viewsphere.geometry.camera import inverse_camera_matrix
 from viewsphere.geometry.rotation import inverse, transform
 from viewsphere.model.sensors.camera import Camera
 from viewsphere.model.thing import Thing
 from viewsphere.truth.raster.geometry import Geometry, seen_from
-from viewsphere.truth.raster.visibility import Visibility, homogeneous, lens_rays, pixels_of, rasterize
+from viewsphere.truth.raster.visibility import Visibility, direction_matrix, homogeneous, lens_rays_to, pixels_of, rasterize
 
 Float = NDArray[np.float64]
 Change = Literal["moved", "deformed", "gone"]
@@ -86,8 +85,11 @@ class View:
 
     @cached_property
     def boxes(self) -> NDArray[np.int32]:
-        """The pixel range of each vertex, (n, 4), as in `truth.raster.visibility.pixels_of`; for a pinhole only."""
-        return pixels_of(self.geometry, self.corners, (self.camera.width, self.camera.height))
+        """The pixel range of each vertex, (n, 4): see `truth.raster.visibility.pixels_of`. Lines must stay straight."""
+        corners = self.corners
+        if self.is_parallel:
+            corners = np.insert(corners[:, :3], 3, 1.0, axis=1)  # 1/w instead of z
+        return pixels_of(self.geometry, corners, (self.camera.width, self.camera.height))
 
     @cached_property
     def shown(self) -> Geometry:
@@ -104,19 +106,22 @@ class View:
         """The triangles and the depth visible to the camera."""
         return rasterize(self.geometry, self.camera, corners=self.corners, keeps_exact=self.is_compared)
 
-    @cached_property
-    def rays(self) -> Float:
-        """The ray of each pixel of a distorted lens (H, W, 3), camera axes; (0, 0, 3) for a pinhole, which needs none."""
-        rays = lens_rays(self.camera)
+    def rays_to(self, inverse_depth: Float) -> Float:
+        """Rays (H, W, 3), camera axes, from the camera's centre to the points that the pixels show at 1/s `inverse_depth` (H,
+        W): see `lens_rays_to`; (0, 0, 3) for a pinhole, which needs none.
+        """
+        rays = lens_rays_to(self.camera, inverse_depth)
         if rays is None:
             rays = np.empty((0, 0, 3))
-            rays.setflags(write=False)
+        rays.setflags(write=False)
         return rays
 
     @cached_property
     def camera_from_ray(self) -> Float:
-        """Matrix (3, 3) from rays to camera axes: K^-1 for a pinhole, whose rays are pixels (x, y, 1); else the identity."""
-        return inverse_camera_matrix(self.camera.intrinsics) if self.is_pinhole else np.eye(3)
+        """Matrix (3, 3) from `rays_to` to camera axes: K^-1 for a pinhole, whose rays are pixels (x, y, 1); else the
+        identity.
+        """
+        return direction_matrix(self.camera) if self.is_pinhole else np.eye(3)
 
     @cached_property
     def world_from_camera(self) -> Float:
@@ -132,6 +137,21 @@ class View:
     def is_pinhole(self) -> bool:
         """Return whether the lens has no distortion."""
         return self.camera.lens.is_linear
+
+    @property
+    def is_straight(self) -> bool:
+        """Return whether `corners` are pixels (u, v, w), which rays meet as (x, y, 1)."""
+        return self.camera.lens.is_straight
+
+    @property
+    def shows_directions(self) -> bool:
+        """Return whether each pixel without a triangle shows a direction of its own: not where all rays have one direction."""
+        return self.is_sky_endless and not self.is_parallel
+
+    @property
+    def is_parallel(self) -> bool:
+        """Return whether all rays have one direction, but begin at different places."""
+        return self.camera.lens.is_parallel
 
     @property
     def has_unit_rays(self) -> bool:
@@ -190,8 +210,8 @@ class View:
         return self.geometry.ground_z is not None and self.geometry.ground_z == other.geometry.ground_z
 
     def has_sky_of(self, other: View) -> bool:
-        """Return whether pixels without a triangle show directions in both views."""
-        return self.is_sky_endless and other.is_sky_endless
+        """Return whether each pixel without a triangle shows a direction of its own in both views."""
+        return self.shows_directions and other.shows_directions
 
 
 @lru_cache(maxsize=4)

@@ -18,6 +18,7 @@ from viewsphere.files import read_bytes
 from viewsphere.geometry.camera import pixel_rays
 from viewsphere.geometry.rotation import transform
 from viewsphere.model.sample import Sample
+from viewsphere.model.sensors.camera import Camera
 from viewsphere.model.thing import Thing
 from viewsphere.run.shots.composing import SceneryRecord
 from viewsphere.run.shots.scenery import Scenery
@@ -116,17 +117,17 @@ class RayCaster:
         directions = rays[rows, columns] @ sample.camera.R
         s = depth / rays[rows, columns, 2]
         slack = TOLERANCE * np.abs(np.where(np.isfinite(s), s, 0.0)) + rounded / np.abs(rays[rows, columns, 2])
-        eye = sample.camera.center - self._middle
+        eye = self._eyes(sample)[rows, columns]
         start = np.where(np.isfinite(s), s - slack, 0.0)
         found, owner = self._nearest(eye + start[:, None] * directions, directions)
         found = found + start
-        first, _ = _cast(self._solid, np.broadcast_to(eye, directions.shape), directions)
+        first, _ = _cast(self._solid, eye, directions)
         with np.errstate(invalid="ignore"):
             there = (np.abs(found - s) <= slack) & (owner == ids)
             height = (eye + s[:, None] * directions)[:, 2]
             off = np.abs(height - self._lowest)
             on_ground = np.isfinite(s) & (off <= slack * np.maximum(1.0, np.abs(directions[:, 2])))
-        there |= (ids == 0) & on_ground & (not self._is_in_ground(eye))
+        there |= (ids == 0) & on_ground & (not self._is_in_ground(sample.camera))
         there |= np.isinf(s) & (ids == 0) & ~self._meets_ground(eye, directions, rays[rows, columns, 2] > 0)
         wrong = ~there | (first < np.where(np.isfinite(s), s - slack, np.inf))
         if wrong.sum() > max(2, OUTLIERS * len(s)):
@@ -137,23 +138,33 @@ class RayCaster:
                 f"stored at {s[i]:.6g} m along the ray, Embree finds {max(owner[i], 0)} at {nearest:.6g} m"
             )
 
+    def _eyes(self, sample: Sample) -> Float:
+        """Places (H, W, 3) where the rays of pixels begin, relative to the middle."""
+        camera = sample.camera
+        if not camera.lens.is_parallel:
+            return np.broadcast_to(camera.center - self._middle, (camera.height, camera.width, 3))
+        return camera.center - self._middle + transform(camera.R.T, camera.lens.origins())
+
     def _nearest(self, origins: Float, directions: Float) -> tuple[Float, NDArray[np.int64]]:
         """Distance along each ray (infinite if nothing is hit) and the id of the hit object, 0 for scenery, -1 for none."""
         (solid, i), (clear, k) = _cast(self._solid, origins, directions), _cast(self._clear, origins, directions)
         of_solid, of_clear = (np.append(own, -1)[which] for own, which in zip(self._owners, (i, k), strict=True))
         return np.minimum(solid, clear), np.where(clear < solid, of_clear, of_solid)
 
-    def _is_in_ground(self, eye: Float) -> bool:
-        """Return whether the camera is in the plane of the ground, where it sees no ground."""
-        return abs(eye[2] - self._lowest) <= EDGE_ON * (1.0 + float(np.linalg.norm(eye + self._middle)))
+    def _is_in_ground(self, camera: Camera) -> bool:
+        """Return whether the camera is in the plane of the ground, or its parallel rays are along it: it sees no ground."""
+        if camera.lens.is_parallel:
+            return bool(abs(camera.R[2, 2]) <= EDGE_ON)
+        height = camera.center[2] - self._middle[2] - self._lowest
+        return bool(abs(height) <= EDGE_ON * (1.0 + float(np.linalg.norm(camera.center))))
 
     def _meets_ground(self, eye: Float, directions: Float, ahead: NDArray[np.bool_]) -> NDArray[np.bool_]:
         """Return a mask of the rays that certainly meet the ground; not all files store the depth of rays that point
         backwards.
         """
-        height = eye[2] - self._lowest
+        height = eye[:, 2] - self._lowest
         steep = np.abs(directions[:, 2]) > LEVEL
-        return ahead & steep & (directions[:, 2] * height < 0) & (abs(height) > LEVEL) & self._has_ground
+        return ahead & steep & (directions[:, 2] * height < 0) & (np.abs(height) > LEVEL) & self._has_ground
 
     def _build(self, sample: Sample) -> None:
         shot_key = self._scenery.key_of(sample.index)

@@ -22,7 +22,7 @@ from viewsphere.model.scene import Matrix4
 from viewsphere.model.sensors.camera import Camera
 from viewsphere.model.shot import Shot
 from viewsphere.truth.raster.geometry import Geometry
-from viewsphere.truth.raster.visibility import Visibility, rasterize
+from viewsphere.truth.raster.visibility import Visibility, lens_rays_to, rasterize
 
 Float = NDArray[np.float64]
 
@@ -100,7 +100,8 @@ class Blur:
             start, end = (whole[i].vertices for whole in ends)
             if start.shape == end.shape:
                 metres = float(np.sqrt(((end - start) ** 2).sum(axis=1)).max(initial=0.0))
-                longest = max(longest, metres * float(near) * camera.intrinsics.fx)
+                share = 1.0 if camera.lens.is_parallel else float(near)
+                longest = max(longest, metres * share * camera.intrinsics.fx)
         return longest
 
     def _camera(self, moment: float) -> Camera:
@@ -117,7 +118,8 @@ class Blur:
         The motion is 0 where the lens does not show the point at both moments. Deforming meshes move as if they were rigid.
         """
         camera, poses = self._camera(now), self._poses(now)
-        rays = pixel_rays(camera.intrinsics)
+        rays = lens_rays_to(camera, visibility.inverse_depth)
+        rays = pixel_rays(camera.intrinsics) if rays is None else rays
         count = len(geometry.triangle_start) - 1
         owner = np.full(len(geometry.triangles), count, np.int32)
         owner[: geometry.triangle_start[-1]] = np.repeat(np.arange(count, dtype=np.int32), np.diff(geometry.triangle_start))
@@ -128,7 +130,10 @@ class Blur:
             points = np.empty_like(rays)
             kernels.carry(rays, visibility.inverse_depth, visibility.triangle, owner, moves, points)
             places.append(project(then.intrinsics, points)[0])
-        return np.nan_to_num(places[1] - places[0], nan=0.0, posinf=0.0, neginf=0.0).astype(np.float32)
+        way = np.nan_to_num(places[1] - places[0], nan=0.0, posinf=0.0, neginf=0.0).astype(np.float32)
+        if camera.lens.is_parallel:
+            way[visibility.triangle < 0] = 0.0  # the sky has one colour
+        return way
 
 
 def _lengths(way: Float32) -> Float32:

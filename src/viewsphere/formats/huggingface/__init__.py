@@ -55,6 +55,7 @@ def _writer(
 
 
 FORMAT = FormatSpec(
+    parallel_rays=True,
     about=__doc__,
     holds=("everything but maps of points",),
     read_by=("datasets",),

@@ -36,6 +36,7 @@ preparer, writer, verify = functions(Yolo)
 
 
 FORMAT = FormatSpec(
+    parallel_rays=True,
     about=__doc__,
     holds=("boxes", "masks", "keypoints", "oriented boxes"),
     read_by=("ultralytics", "supervision", "datumaro"),

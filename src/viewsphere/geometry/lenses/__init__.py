@@ -136,7 +136,7 @@ class LensSpec(BaseModel):
     )
     rays: Callable[[Any, Float], Rays] = Field(
         description="`rays(lens, xy)`: the rays through positions (N, 2) of the picture, in camera axes, NaN where there is "
-        "none. All pass through the camera's centre: use `viewsphere.geometry.lenses.central`"
+        "none. They begin at the camera's centre (use `viewsphere.geometry.lenses.central`), unless `is_parallel`"
     )
     project: Callable[[Any, Float], Float] = Field(
         description="`project(lens, points)`: the positions (N, 2) in the picture of points (N, 3) in camera axes, NaN where "
@@ -149,6 +149,11 @@ class LensSpec(BaseModel):
     )
     is_linear: bool = Field(
         default=False, description="whether pixels are K times points, as a pinhole's: straight lines stay straight"
+    )
+    is_parallel: bool = Field(
+        default=False,
+        description="whether all rays are parallel to the axis: K then maps x and y, metres, to pixels, and straight lines "
+        "stay straight",
     )
     is_scan: bool = Field(default=False, description="whether pixels are a LiDAR's measurements instead of a picture")
     has_depth: bool = Field(
@@ -219,6 +224,16 @@ class Lens:
         return self.spec.is_linear
 
     @property
+    def is_parallel(self) -> bool:
+        """Return whether all rays are parallel to the axis, and begin in the plane z = 0, instead of at the camera's centre."""
+        return self.spec.is_parallel
+
+    @property
+    def is_straight(self) -> bool:
+        """Return whether straight lines stay straight: pixels are a projective map of points, see `Camera.P`."""
+        return self.spec.is_linear or self.spec.is_parallel
+
+    @property
     def has_unit_rays(self) -> bool:
         """Return whether ray directions are unit vectors, which may point anywhere, instead of vectors of z = 1."""
         return self.spec.has_unit_rays
@@ -283,16 +298,21 @@ class Lens:
             rays, y = np.empty((y1 - y0, x1 - x0, 3)), (down - i.cy) / i.fy
             rays[..., 0], rays[..., 1] = (across - i.cx - i.skew * y[:, None]) / i.fx, y[:, None]
         else:
-            xy = np.empty((y1 - y0, x1 - x0, 2))
-            xy[..., 0], xy[..., 1] = across, down[:, None]
-            origins, rays = self.rays(xy)
-            if origins.any():
+            origins, rays = self.rays(_grid(across, down))
+            if origins.any() and not self.is_parallel:
                 raise PluginError(
                     f"lens {self.name}: its rays do not all begin at the camera's centre. Return `central(directions)`"
                 )
         if not self.has_unit_rays:
             rays[..., 2] = 1.0  # also where it has no ray
         return rays
+
+    def origins(self) -> Float:
+        """Places, in camera axes, where the rays through the pixels' centres begin, (H, W, 3): 0 unless rays are parallel."""
+        i = self.intrinsics
+        if not self.is_parallel:
+            return np.broadcast_to(np.zeros(3), (i.height, i.width, 3))
+        return self.rays(_grid(np.arange(i.width) + 0.5, np.arange(i.height) + 0.5)).origins
 
     def project(self, points: ArrayLike) -> tuple[Float, NDArray[np.bool_]]:
         """Positions in the picture, (..., 2) float64, of points (..., 3) in camera axes, and whether the lens shows them, (...)
@@ -328,6 +348,13 @@ class Lens:
         return across, down
 
 
+def _grid(across: NDArray[np.floating], down: NDArray[np.floating]) -> Float:
+    """Positions (H, W, 2) of columns (W,) and rows (H,)."""
+    xy = np.empty((len(down), len(across), 2))
+    xy[..., 0], xy[..., 1] = across, down[:, None]
+    return xy
+
+
 def _angles_off_axis(directions: Float) -> Float:
     """Angles of directions (N, 3) to the optical axis, degrees."""
     return np.degrees(np.arctan2(np.hypot(directions[:, 0], directions[:, 1]), directions[:, 2]))
@@ -359,7 +386,9 @@ class Intrinsics(Protocol):
 
 
 class Camera(Protocol):
-    """Intrinsics and the world-to-camera motion x_camera = R x_world + t (OpenCV axes, metres); P is K [R|t], (3, 4)."""
+    """Intrinsics and the world-to-camera motion x_camera = R x_world + t (OpenCV axes, metres); P, (3, 4), is K [R|t], or for
+    parallel rays K [R|t] with (0, 0, 0, 1) as the last row of [R|t].
+    """
 
     @property
     def intrinsics(self) -> Intrinsics: ...

@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 
 from viewsphere.errors import PluginError
 from viewsphere.geometry.box import Bounds, is_behind, projected_bounds
-from viewsphere.geometry.camera import inverse_camera_matrix
 from viewsphere.geometry.seam import turns
 from viewsphere.labels.shared.needs import Need, OwnView, Partner
 from viewsphere.labels.shared.placement import Placement
@@ -20,7 +19,15 @@ from viewsphere.model.fields.frozen import Frozen
 from viewsphere.model.sensors.camera import Camera
 from viewsphere.truth.correspondences.correspondence import Match
 from viewsphere.truth.raster.geometry import Geometry
-from viewsphere.truth.raster.visibility import Instances, Visibility, homogeneous, lens_rays, rasterize
+from viewsphere.truth.raster.visibility import (
+    Instances,
+    Visibility,
+    direction_matrix,
+    homogeneous,
+    lens_rays,
+    lens_rays_to,
+    rasterize,
+)
 from viewsphere.truth.shot_views import NeighbourViews
 from viewsphere.truth.view import View
 
@@ -140,8 +147,19 @@ class LabelContext:
         return partner and partner[1]
 
     @_Shared
+    def rays_to(self) -> NDArray[np.float64]:
+        """Rays (H, W, 3), camera axes, from the camera's centre to the seen points: `rays`, except for parallel rays."""
+        rays = lens_rays_to(self.camera, self.visibility.inverse_depth.astype(np.float64))
+        return self.rays if rays is None else rays
+
+    @_Shared
+    def camera_from_ray_to(self) -> NDArray[np.float64]:
+        """Matrix (3, 3) from `rays_to` to camera axes."""
+        return np.eye(3) if self.camera.lens.is_parallel else self.camera_from_ray
+
+    @_Shared
     def rays(self) -> NDArray[np.float64]:
-        """The ray of each pixel of a distorted lens (H, W, 3), in camera axes; (0, 0, 3) for a pinhole, which needs none."""
+        """The ray of each pixel of a distorted lens (H, W, 3), in camera axes; (0, 0, 3) if rays are pixels (x, y, 1)."""
         rays = lens_rays(self.camera)
         if rays is None:
             rays = np.empty((0, 0, 3))
@@ -155,8 +173,8 @@ class LabelContext:
 
     @_Shared
     def camera_from_ray(self) -> NDArray[np.float64]:
-        """Matrix (3, 3) from rays to camera axes: K^-1 for a pinhole, whose rays are pixels (x, y, 1); else the identity."""
-        return inverse_camera_matrix(self.camera.intrinsics) if self.camera.lens.is_linear else np.eye(3)
+        """Matrix (3, 3) from `rays` to their directions in camera axes, see `truth.raster.visibility.direction_matrix`."""
+        return direction_matrix(self.camera)
 
     @property
     def inverse_depth(self) -> NDArray[np.float64]:
@@ -176,7 +194,7 @@ class LabelContext:
     def _projected(self, i: int) -> tuple[Bounds | None, bool]:
         g = self.geometry
         (first, stop), (base, end) = g.triangle_start[i : i + 2], g.vertex_start[i : i + 2]
-        if first < stop and self.camera.lens.is_linear and is_behind(self.camera, g.bounds[i]):
+        if first < stop and self.camera.lens.is_straight and is_behind(self.camera, g.bounds[i]):
             return None, False
         triangles = g.triangles[first:stop] - np.int32(base)
         return projected_bounds(self.camera, g.places(i), triangles, g.is_used[base:end])
@@ -198,7 +216,11 @@ class LabelContext:
             meets[i] = False
             if meets.any():
                 return False
-        return geometry.ground_z is None or float(self.camera.center[2]) > geometry.ground_z
+        if geometry.ground_z is None:
+            return True
+        if self.camera.lens.is_parallel:
+            return float(self.camera.R[2, 2]) < 0.0
+        return float(self.camera.center[2]) > geometry.ground_z
 
     @_Shared
     def _reaches(self) -> NDArray[np.float64]:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Generic, Protocol, TypeVar
 
 if TYPE_CHECKING:
     from viewsphere.model.scene import Finish
+    from viewsphere.model.sensors.camera import Intrinsics
     from viewsphere.model.sensors.rig import Sensor
     from viewsphere.model.shot import Shot
     from viewsphere.recipe.recipe import Recipe
@@ -232,3 +233,13 @@ class ShotAppearance(Need[Scenery]):
 def requires(needs: tuple[Need[Any], ...], kind: type[Need[Any]]) -> bool:
     """Return whether any of these needs is of the kind."""
     return any(isinstance(need, kind) for need in needs)
+
+
+def no_disparity(intrinsics: Intrinsics) -> str | None:
+    """The reason why pictures of this lens have no disparity; None if they have."""
+    if not intrinsics.lens.is_parallel:
+        return None
+    return (
+        f"expected a lens whose rays pass through one centre; found {intrinsics.lens.name}, whose disparity is constant, "
+        f"baseline x {intrinsics.fx:g} pixels a metre: leave it out"
+    )

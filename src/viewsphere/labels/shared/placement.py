@@ -130,11 +130,12 @@ class Placement:
     @cached_property
     def view(self) -> ObjectView:
         """The camera as the object sees it, around the centre of its box."""
-        return view_of(self.camera_from_object, Box3d(self.box).center)
+        return view_of(self.camera_from_object, Box3d(self.box).center, self.camera.lens.is_parallel)
 
 
-def view_of(camera_from_object: Float, center: Float) -> ObjectView:
-    """Orbit angles, distance and tilt of the camera around the point `center` (3,) of the object's own axes.
+def view_of(camera_from_object: Float, center: Float, is_parallel: bool = False) -> ObjectView:
+    """Orbit angles, distance and tilt of the camera around the point `center` (3,) of the object's own axes. If its rays are
+    parallel, they are those of a camera that looks at the point: from the place where the point's ray begins.
 
     Azimuth is in [0, 360). Tilt is in [-180, 180]: the camera's roll after the shortest rotation that makes it look at the
     point. So for a camera that looks at the point, the angles equal its viewpoint's.
@@ -144,6 +145,8 @@ def view_of(camera_from_object: Float, center: Float) -> ObjectView:
     columns = [[row[k] for row in rows] for k in range(3)]
     middle = center.tolist()
     seen = [_dot(row, middle) + row[3] for row in rows]
+    if is_parallel:
+        seen = [0.0, 0.0, seen[2]]
     distance = math.hypot(*seen)
     if distance == 0:
         return ObjectView(0.0, 0.0, 0.0, 0.0)

@@ -26,6 +26,8 @@ def misplaced(sample: Sample, points: Float, pixels: NDArray[np.bool_], slack: F
     """
     rays = pixel_rays(sample.camera.intrinsics)
     rays = rays.reshape(-1, 3) if pixels.all() else rays[pixels]
+    if sample.camera.lens.is_parallel:
+        points = points - sample.camera.lens.origins()[pixels]
     x, y, z = points.T  # by columns, because numpy is slow on rows of three
     a, b, c = rays.T
     along = (x * a + y * b + z * c) / (a * a + b * b + c * c)

@@ -19,6 +19,7 @@ from viewsphere.labels.shared.placement import ModelFacts, Placement
 from viewsphere.model.channel import Channel
 from viewsphere.model.fields.frozen import Frozen
 from viewsphere.model.sample import ObjectAnnotation, Sample
+from viewsphere.model.sensors.camera import Intrinsics
 from viewsphere.plugins.registry import Kind
 from viewsphere.plugins.spec import Spec
 
@@ -103,6 +104,10 @@ class LabelSpec(Spec):
         default=_no_proof,
         description="`prove(sample, models)`: yields a message for each contradiction within a stored sample. `check` also "
         "recomputes every label",
+    )
+    refuses: Callable[[Intrinsics], str | None] | None = described(
+        default=None,
+        description="`refuses(intrinsics)`: the reason why pictures of this lens cannot have the label, None if they can",
     )
     drawing: InstanceOf[Drawing] | None = described(default=None, description="the `Drawing` of previews and reports")
     panoramas: bool = described(

@@ -85,7 +85,7 @@ def _visible(channels: Channels, camera: Camera, categories: Mapping[int, int]) 
     picture = next((name for name in PICTURES if name in channels), None)
     return PointCloud(
         "camera",
-        rays[seen] * lengths[seen][:, None],
+        camera.lens.origins()[seen] + rays[seen] * lengths[seen][:, None],
         np.ones(int(seen.sum()), np.bool_),
         channels[picture][seen][:, :3] if picture else None,
         _taken(channels, "normals", seen),

@@ -62,8 +62,12 @@ class Camera:
 
     @property
     def P(self) -> NDArray[np.float64]:
-        """Projection matrix K [R|t], (3, 4) float64; exact for an undistorted lens."""
+        """Projection matrix K [R|t], (3, 4) float64; exact for an undistorted lens. For parallel rays, the last row of [R|t] is
+        (0, 0, 0, 1).
+        """
         motion = np.column_stack([self.R, self.t])
+        if self.lens.is_parallel:
+            motion[2] = 0.0, 0.0, 0.0, 1.0
         return transform(self.K, motion.T).T
 
     @cached_property

@@ -112,7 +112,7 @@ def out_of_view(recipe: Recipe, views: Poses, lens: Intrinsics) -> Iterator[str]
 def hidden_background(scene: SceneEntry, views: Poses, lens: Intrinsics) -> Iterator[str]:
     """A warning if an endless ground hides most of the background photographs, on average over the poses."""
     pictures = [entry for entry in scene.backgrounds if entry.image is not None or entry.images is not None]
-    if not pictures or not scene.always_has_ground:
+    if not pictures or not scene.always_has_ground or lens.lens.is_parallel:
         return
     draws = [views.drawn_for(str(n)) for n in range(DRAWS)]  # scenes draw their own poses, few each
     hidden = fmean(_below_horizon(there.view(i).elevation, lens) for there in draws for i in _some(there, MOST_POSES // DRAWS))
@@ -135,9 +135,10 @@ def too_small(recipe: Recipe, views: Poses, lens: Intrinsics) -> Iterator[str]:
     if fills or not views.are_known:
         return
     farthest = max(views.view(i).distance for i in chosen) * (1 + span(recipe.scene.jitter.distance)[1])
+    scale = max(lens.fx, lens.fy) / (1.0 if lens.lens.is_parallel else farthest)
     for i, entry in enumerate(recipe.models):
         length = _length(entry)
-        pixels = math.inf if length is None else length * max(lens.fx, lens.fy) / farthest
+        pixels = math.inf if length is None else length * scale
         if pixels < SMALLEST:
             yield (
                 f"models[{i}]: {length:g} m seen from {farthest:g} m are about {pixels:.2g} pixels, {TOO_SMALL}: come "

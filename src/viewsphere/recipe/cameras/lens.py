@@ -34,7 +34,7 @@ def _read(value: Any) -> Any:
 
 def _bends(spec: LensSpec) -> bool:
     """Return whether a lens can follow from an angle or a focal length; others have options instead."""
-    return spec.has_depth and not spec.is_scan
+    return spec.has_depth and not spec.is_scan and not spec.is_parallel
 
 
 class _Schema:

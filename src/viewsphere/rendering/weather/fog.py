@@ -27,24 +27,39 @@ OPAQUE = 80.0
 
 @dataclass(frozen=True, eq=False)
 class Air:
-    """The air along rays from one eye. stretch (N,): metres of range for a metre of their depth (see `Visibility`); rise (N,):
-    sine of their elevation. is_outdoors: the air is beyond the windows of a room, and only ground and sky are visible through
-    it.
+    """The air along rays.
+
+    eye: the height from which they begin, or the heights (N,) of parallel rays; stretch (N,): metres of range for a metre of
+    their depth (see `Visibility`); rise (N,): sine of their elevation. is_outdoors: the air is beyond the windows of a room,
+    and only ground and sky are visible through it.
     """
 
     fog: Fog
-    eye: float
+    eye: float | Float
     stretch: Float32
     rise: Float32
     is_outdoors: bool = False
 
     @classmethod
-    def for_camera(cls, fog: Fog, camera: Camera, rays: NDArray[np.floating] | None = None, is_outdoors: bool = False) -> Air:
-        """The air in front of a camera, along rays (N, 3) in its axes, by default through its pixel centres."""
+    def for_camera(
+        cls,
+        fog: Fog,
+        camera: Camera,
+        rays: NDArray[np.floating] | None = None,
+        is_outdoors: bool = False,
+        at: NDArray[np.floating] | None = None,
+    ) -> Air:
+        """The air in front of a camera, along rays (N, 3) in its axes through positions `at` (N, 2), by default through its
+        pixel centres.
+        """
         ray = np.nan_to_num(pixel_rays(camera.intrinsics).reshape(-1, 3) if rays is None else rays)
         length = np.sqrt((ray * ray).sum(axis=1))
         rise = (ray @ camera.R[:, 2]) / np.maximum(length, 1e-12)
-        return cls(fog, float(camera.center[2]), length.astype(np.float32), rise.astype(np.float32), is_outdoors)
+        eye: float | Float = float(camera.center[2])
+        if camera.lens.is_parallel:
+            begin = camera.lens.origins().reshape(-1, 3) if at is None else camera.lens.rays(at).origins
+            eye = eye + begin @ camera.R[:, 2]
+        return cls(fog, eye, length.astype(np.float32), rise.astype(np.float32), is_outdoors)
 
     def depth(self, inverse: Float32, which: NDArray[np.integer] | slice = slice(None)) -> Float32:
         """Optical depth (n,) of the rays with these indices, from the eye to the surface with this 1/depth; 0 is the sky."""
@@ -52,7 +67,8 @@ class Air:
             away = self.stretch[which] / inverse
             if self.fog.height is None:
                 return np.minimum(away * self.fog.extinction, OPAQUE).astype(np.float32)
-            begin = self.fog.extinction * np.exp(-min(max(self.eye / self.fog.height, -80.0), 80.0))
+            eye = self.eye[which] if isinstance(self.eye, np.ndarray) else self.eye
+            begin = self.fog.extinction * np.exp(-np.clip(eye / self.fog.height, -80.0, 80.0))
             rate = (self.rise[which] / self.fog.height).astype(np.float64)
             level = np.abs(rate) < LEVEL
             climbed = np.clip(np.where(level, 0.0, rate) * np.where(np.isinf(away), 1e9, away), -60, 700)

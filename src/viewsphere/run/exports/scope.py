@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from viewsphere import plugins
 from viewsphere.errors import UserError
 from viewsphere.formats import Scope
-from viewsphere.formats.shared.writing.refusals import depth_lenses, lacking_labels
+from viewsphere.formats.shared.writing.refusals import central, depth_lenses, lacking_labels
 from viewsphere.labels import label_named, label_names
 from viewsphere.model.channel import PASSES, missing, picture_of
 from viewsphere.model.sample import Sample
@@ -123,6 +123,8 @@ def not_held(spec: FormatSpec, entry: FormatEntry, scope: Scope) -> Iterator[str
     yield from _too_deep(spec, entry, scope)
     if not spec.panoramas:
         yield from depth_lenses(scope)
+    if not spec.parallel_rays:
+        yield from central(scope)
     if spec.refuses is not None:
         yield from spec.refuses(scope, *entry.arguments())
 

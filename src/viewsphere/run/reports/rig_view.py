@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 
 from viewsphere.assets.mesh import Material, Mesh
 from viewsphere.composing.viewpoints.sequence_poses import poses_of
-from viewsphere.geometry.camera import pixel_rays
 from viewsphere.geometry.rotation import transform
 from viewsphere.model.sensors.camera import Intrinsics
 from viewsphere.model.sensors.rig import Rig, Sensor
@@ -52,7 +51,9 @@ ALONG = 8
 
 @dataclass(frozen=True)
 class _SensorFacts:
-    """A sensor in words: `fov_deg` across and down; `position` in metres and `rotation` in degrees as recipes write them."""
+    """A sensor in words: `fov_deg` across and down, or `span_m` if its rays are parallel. `position` (metres) and `rotation`
+    (degrees) are as recipes write them.
+    """
 
     name: str
     color: str
@@ -62,6 +63,7 @@ class _SensorFacts:
     rotation: tuple[float, float, float]
     distortion: str | None
     channels: tuple[str, ...] | None
+    span_m: tuple[float, float] | None = None
 
 
 def recipe_rig(recipe: Recipe) -> Rig:
@@ -84,8 +86,9 @@ def _facts(sensor: Sensor, color: str) -> _SensorFacts:
     x, y, z = (round(float(v), 9) + 0.0 for v in pose[:3, 3])
     distortion = None if own.lens.is_linear else own.lens.name
     size = own.width, own.height
+    span = (own.width / own.fx, own.height / own.fy) if own.lens.is_parallel else None
     return _SensorFacts(
-        sensor.name, color, size, own.lens.field_of_view(), (x, y, z), _angles(pose), distortion, sensor.channels
+        sensor.name, color, size, own.lens.field_of_view(), (x, y, z), _angles(pose), distortion, sensor.channels, span
     )
 
 
@@ -102,7 +105,8 @@ def rig_lines(rig: Rig) -> Iterator[str]:
     yield quantity(len(facts), "sensor")
     for one in facts:
         place, turn = (", ".join(f"{v:.6g}" for v in values) for values in (one.position, one.rotation))
-        lens = f"{one.size[0]} x {one.size[1]}, {one.fov_deg[0]:.4g} x {one.fov_deg[1]:.4g} degrees"
+        (across, down), unit = (one.fov_deg, "degrees") if one.span_m is None else (one.span_m, "m")
+        lens = f"{one.size[0]} x {one.size[1]}, {across:.4g} x {down:.4g} {unit}"
         yield f"  {one.name} ({one.color})"
         yield f"    lens      {lens}" + (f", {one.distortion}" if one.distortion else "")
         yield f"    position  [{place}] m (right, down, ahead)"
@@ -145,10 +149,10 @@ def _in_model_axes(points: Float) -> Float:
 
 def _camera_shape(own: Intrinsics, depth: float) -> Float:
     """Triangles (T, 3, 3) of a sensor in its own axes: its body, the edges of its frustum, and a mark above its upper side."""
-    border = [depth * _unit(rays) for rays in _borders(own)]
+    border = [ends for _, ends in _borders(own, depth)]
     thick, body = BAR * depth, BODY * depth
     bars = [_bar(a, b, thick) for side in border for a, b in pairwise(side)]
-    bars += [_bar(np.zeros(3), side[0], thick) for side in border if len(side)]
+    bars += [_bar(begin[0], ends[0], thick) for begin, ends in _borders(own, depth) if len(ends)]
     bars.append(_bar(np.array([0.0, 0.0, -1.2 * body]), np.array([0.0, 0.0, 0.2 * body]), body))
     top = border[0]
     if len(top) > 2:
@@ -157,14 +161,19 @@ def _camera_shape(own: Intrinsics, depth: float) -> Float:
     return np.concatenate(bars)
 
 
-def _borders(own: Intrinsics) -> list[Float]:
-    """Rays (N, 3) along the upper, right, lower and left side of the picture, clockwise, from corner to corner."""
+def _borders(own: Intrinsics, depth: float) -> list[tuple[Float, Float]]:
+    """Beginnings and ends (N, 3) of rays of this length along the upper, right, lower and left side of the picture, clockwise,
+    from corner to corner.
+    """
     w, h = own.width, own.height
-    strips = (0, 0, w, 1), (w - 1, 0, w, h), (0, h - 1, w, h), (0, 0, 1, h)
-    sides = [pixel_rays(own, 1, strip).reshape(-1, 3) for strip in strips]
-    sides = [sides[0], sides[1], sides[2][::-1], sides[3][::-1]]
-    picked = (side[np.unique(np.linspace(0, len(side) - 1, ALONG + 1).astype(int))] for side in sides)
-    return [side[~np.isnan(side).any(axis=1)] for side in picked]
+    x, y = np.arange(w) + 0.5, np.arange(h) + 0.5
+    sides = [np.column_stack(np.broadcast_arrays(*at)) for at in ((x, 0.5), (w - 0.5, y), (x[::-1], h - 0.5), (0.5, y[::-1]))]
+    borders = list[tuple[Float, Float]]()
+    for side in sides:
+        origins, rays = own.lens.rays(side[np.unique(np.linspace(0, len(side) - 1, ALONG + 1).astype(int))])
+        known = ~np.isnan(rays).any(axis=1)
+        borders.append((origins[known], origins[known] + depth * _unit(rays[known])))
+    return borders
 
 
 def _unit(rays: Float) -> Float:

@@ -13,14 +13,13 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from viewsphere.geometry.camera import project
 from viewsphere.geometry.rotation import product, transform
 from viewsphere.geometry.seam import short_way
 from viewsphere.truth.correspondences.maps import Maps, maps_between
 from viewsphere.truth.kernel_constants import OTHER, STILL
 from viewsphere.truth.raster.visibility import Visibility
 from viewsphere.truth.surface_points.attached import shifts, stick, weights_of
-from viewsphere.truth.surface_points.raster import Placed, in_lens, pixels_at, states
+from viewsphere.truth.surface_points.raster import Placed, in_lens, pixels_at, positions_along, states
 from viewsphere.truth.view import View
 
 Float = NDArray[np.float64]
@@ -133,13 +132,17 @@ class Match:
         return self.visibility.inverse_depth.astype(np.float64) if exact is None else exact
 
     @cached_property
+    def _rays(self) -> Float:
+        return self.view.rays_to(self._inverse)
+
+    @cached_property
     def _maps(self) -> Maps:
         return maps_between(self.view, self.other)
 
     @property
     def _pixels(self) -> tuple[NDArray[np.int32], NDArray[np.int32], Float, Float, NDArray[np.int32]]:
         """The arguments for pixels and things that all kernels take."""
-        inverse, rays = self._inverse.reshape(-1), self.view.rays.reshape(-1)
+        inverse, rays = self._inverse.reshape(-1), self._rays.reshape(-1)
         return self.visibility.triangle, self.view.owners, inverse, rays, self._maps.kinds
 
     def _moved(self, turn: Float, kind: type[Real]) -> NDArray[Real]:
@@ -163,7 +166,7 @@ class Match:
         rays, near = np.empty((*self._inverse.shape, 3)), np.empty(self._inverse.shape)
         matrices = self._maps.matrices(product(self._maps.turn, self.view.camera_from_ray))
         kernels.as_rays(*self._pixels, matrices, self.other.has_unit_rays, rays.reshape(-1), near.reshape(-1))
-        xy, _ = project(self.other.camera.intrinsics, rays)
+        xy = positions_along(self.other, rays, near)
         still = self._shows(STILL)
         xy[still] = pixel_centers(self._inverse.shape)[still]
         near[~in_lens(xy) & ~np.isnan(near)] = 0.0
@@ -181,7 +184,7 @@ class Match:
         pixel = np.flatnonzero(self._shows(OTHER))
         triangle = self.visibility.triangle.reshape(-1)[pixel]
         centers = pixel_centers(self._inverse.shape).reshape(-1, 2)[pixel]
-        rays = np.column_stack((centers, np.ones(len(pixel)))) if self.view.is_pinhole else self.view.rays.reshape(-1, 3)[pixel]
+        rays = np.column_stack((centers, np.ones(len(pixel)))) if self.view.is_straight else self._rays.reshape(-1, 3)[pixel]
         weights = weights_of(self.view, triangle, rays)
         further = triangle + shifts(self.view, self.other)[self.view.owners[triangle]]
         places, corners = list[Float](), list[Float]()

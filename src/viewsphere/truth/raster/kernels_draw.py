@@ -211,40 +211,49 @@ def _draw_small(t, e0, e1, e2, n, box, canvas, nearest, seen):
 
 @inner
 def _draw_rows(t, e0, e1, e2, n, box, canvas, nearest, seen):
-    """Draw a wide triangle row by row: first and last pixel are computed, then settled by the exact test.
-
-    The crossing -f / e uses the same f as the test, so its error is a few roundings of f: far less than EPSILON.
-    """
-    xa, ya, xb, yb = box
+    """Draw a wide triangle row by row."""
     samples, x0, y0 = canvas
-    step, first = 1.0 / samples, x0 + 0.5
-    k0, k1, k2 = crossing_at(e0[0], samples), crossing_at(e1[0], samples), crossing_at(e2[0], samples)
-    for y in range(ya, yb + 1):
-        py = (y + y0 + 0.5) * step
-        f0, f1, f2 = e0[1] * py + e0[2], e1[1] * py + e1[2], e2[1] * py + e2[2]
-        low, high = float(xa), float(xb)
-        for e, k, f in ((e0[0], k0, f0), (e1[0], k1, f1), (e2[0], k2, f2)):
-            cross = f * k - first
-            if e > 0.0:
-                low = max(low, cross - EPSILON)
-            elif e < 0.0:
-                high = min(high, cross + EPSILON)
-            elif f < 0.0:
-                high = -1.0
-        if low > high:
-            continue
-        left, right = math.ceil(low), math.floor(high)
-        while left <= right and not _inside(e0, e1, e2, (left + x0 + 0.5) * step, f0, f1, f2):
-            left += 1
-        while left <= right and not _inside(e0, e1, e2, (right + x0 + 0.5) * step, f0, f1, f2):
-            right -= 1
-        uy, s = np.uintp(y), n[1] * py + n[2]
+    step = 1.0 / samples
+    for y in range(box[1], box[3] + 1):
+        left, right = row_span((e0, e1, e2), y, box, canvas)
+        uy, s = np.uintp(y), n[1] * ((y + y0 + 0.5) * step) + n[2]
         for x in range(left, right + 1):
             inverse = n[0] * ((x + x0 + 0.5) * step) + s
             ux = np.uintp(x)
             better = inverse > nearest[uy, ux] * NEARER
             nearest[uy, ux] = inverse if better else nearest[uy, ux]
             seen[uy, ux] = t if better else seen[uy, ux]
+
+
+@inner
+def row_span(edges, y, box, canvas):
+    """First and last sample of a triangle in a row of its box, the last before the first if there is none. They are computed,
+    then settled by the exact test.
+
+    The crossing -f / e uses the same f as the test, so its error is a few roundings of f: far less than EPSILON.
+    """
+    e0, e1, e2 = edges
+    samples, x0, y0 = canvas
+    step, first = 1.0 / samples, x0 + 0.5
+    py = (y + y0 + 0.5) * step
+    f0, f1, f2 = e0[1] * py + e0[2], e1[1] * py + e1[2], e2[1] * py + e2[2]
+    low, high = float(box[0]), float(box[2])
+    for e, f in ((e0[0], f0), (e1[0], f1), (e2[0], f2)):
+        cross = f * crossing_at(e, samples) - first
+        if e > 0.0:
+            low = max(low, cross - EPSILON)
+        elif e < 0.0:
+            high = min(high, cross + EPSILON)
+        elif f < 0.0:
+            high = -1.0
+    if low > high:
+        return 0, -1
+    left, right = math.ceil(low), math.floor(high)
+    while left <= right and not _inside(e0, e1, e2, (left + x0 + 0.5) * step, f0, f1, f2):
+        left += 1
+    while left <= right and not _inside(e0, e1, e2, (right + x0 + 0.5) * step, f0, f1, f2):
+        right -= 1
+    return left, right
 
 
 @inner

@@ -74,6 +74,43 @@ def draw_four(
 
 
 @intrinsic
+def draw_four_deep(
+    typing: Any, nearest: Any, seen: Any, at: Any, t: Any, first: Any, step: Any, e: Any, f: Any, plane: Any, bounds: Any
+) -> Any:
+    """`draw_four` along parallel rays: `nearest` is z, which is a (x - u) + s for the plane (a, u, s), within the bounds.
+
+    A sample's z must be above 0 and, times NEARER, less than the z shown so far.
+    """
+
+    def code(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        nearest, seen, at, t, first, step, e, f, plane, bounds = arguments
+        place = _from(context, builder, signature.args[0], nearest, at, _REALS)
+        owner = _from(context, builder, signature.args[1], seen, at, _WHOLES)
+        order = ir.Constant(_REALS, [float(i) for i in range(FOUR)])
+        x = builder.fmul(builder.fadd(_spread(builder, first), order), _spread(builder, step))
+        slope, begin, offset, low, high = (
+            _spread(builder, builder.extract_value(*part))
+            for part in ((plane, 0), (plane, 1), (plane, 2), (bounds, 0), (bounds, 1))
+        )
+        z = builder.fadd(builder.fmul(slope, builder.fsub(x, begin)), offset)
+        z = builder.select(builder.fcmp_ordered("<", z, low), low, z)
+        z = builder.select(builder.fcmp_ordered(">", z, high), high, z)
+        shown, zero = builder.load(place, align=8), ir.Constant(_REALS, [0.0] * FOUR)
+        flags = builder.fcmp_ordered("<", builder.fmul(z, ir.Constant(_REALS, [NEARER] * FOUR)), shown)
+        flags = builder.and_(flags, builder.fcmp_ordered(">", z, zero))
+        for i in range(3):
+            slope, offset = _spread(builder, builder.extract_value(e, i)), _spread(builder, builder.extract_value(f, i))
+            flags = builder.and_(flags, builder.fcmp_ordered(">=", builder.fadd(builder.fmul(slope, x), offset), zero))
+        number = _spread(builder, builder.trunc(t, _WHOLE))
+        builder.store(builder.select(flags, z, shown), place, align=8)
+        builder.store(builder.select(flags, number, builder.load(owner, align=4)), owner, align=4)
+        return context.get_dummy_value()
+
+    pair = nb.types.UniTuple(nb.float64, 2)
+    return nb.void(nearest, seen, at, nb.intp, nb.float64, nb.float64, _EDGES, _EDGES, _EDGES, pair), code
+
+
+@intrinsic
 def meet_four(
     typing: Any, x: Any, y: Any, nearest: Any, met: Any, own: Any, at: Any, t: Any, e0: Any, e1: Any, e2: Any, n: Any
 ) -> Any:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from viewsphere.geometry.camera import pixel_rays
+from viewsphere.geometry.camera import inverse_camera_matrix, pixel_rays
 from viewsphere.geometry.lenses import Window
 from viewsphere.model.sensors.camera import Camera, Intrinsics
 from viewsphere.truth.raster.geometry import Geometry, seen_from
@@ -49,9 +49,9 @@ class Visibility:
     """triangle (H, W) int32: the visible triangle, -1 if there is none; inverse_depth (H, W) float32: 1/s, 0 if no triangle is
     visible.
 
-    The visible point is `center + R.T @ (s * ray)`, with the ray from `geometry.camera.pixel_rays`. The ray's z is 1 (so s is
-    z-depth) for a pinhole and for Brown-Conrady, and its length is 1 for a fisheye and a scan, whose rays may point sideways or
-    back.
+    The visible point is `center + R.T @ (origin + s * ray)`, with origin and ray as `geometry.lenses.Lens.origins` and
+    `directions` give them. The ray's z is 1 (so s is z-depth) for a pinhole, for Brown-Conrady and for parallel rays. Its
+    length is 1 for a fisheye and a scan, whose rays may point sideways or back.
     """
 
     triangle: NDArray[np.int32]
@@ -129,11 +129,13 @@ def with_ground(geometry: Geometry, camera: Camera, visibility: Visibility) -> V
 
 def is_edge_on(geometry: Geometry, camera: Camera) -> bool:
     """Return whether the camera is in the plane of the ground, within rounding error. Rays then meet the ground, if at all, at
-    the camera's own centre.
+    the camera's own centre. Parallel rays must be along the ground instead.
     """
     center = camera.center
     if geometry.ground_z is None:
         return False
+    if camera.lens.is_parallel:
+        return abs(float(camera.R[2, 2])) <= EDGE_ON
     return abs(float(center[2]) - geometry.ground_z) <= EDGE_ON * (1.0 + float(np.linalg.norm(center)))
 
 
@@ -154,14 +156,18 @@ def homogeneous(geometry: Geometry, camera: Camera, base: int = 0, stop: int | N
     """Vertices [base, stop) before the perspective division, and the inverse of their third coordinate, (n, 4).
 
     They are K (R X + t) for a pinhole, and R X + t (camera axes) for a distorted lens. The inverse is infinite unless positive.
+    For parallel rays they are (u, v, 1, z): pixels, and metres along the axis.
     If all vertices are requested, things outside a pinhole's picture are left out: the first vertex of such a thing is
     `OUTSIDE`, and the others are arbitrary. `in_picture` gives the remaining ones.
     """
-    k = camera.K if camera.lens.is_linear else np.eye(3)
+    lens = camera.lens
+    if lens.is_parallel:
+        return _along_parallel_rays(geometry, camera, base, stop)
+    k = camera.K if lens.is_linear else np.eye(3)
     moved = np.empty((3, 4))
     moved[:, :3], moved[:, 3] = camera.R, camera.t
     m = k[:, :1] * moved[0] + k[:, 1:2] * moved[1] + k[:, 2:] * moved[2]
-    if base or stop is not None or not camera.lens.is_linear:
+    if base or stop is not None or not lens.is_linear:
         return projected(geometry, m, base, stop)
     end, without = len(geometry.coordinates), _outside(geometry, camera, m)
     q = geometry.spare.array((end, 4), np.float64)
@@ -169,6 +175,16 @@ def homogeneous(geometry: Geometry, camera: Camera, base: int = 0, stop: int | N
     q[[start for start, is_left_out in starts if is_left_out and start < end]] = OUTSIDE
     for first, last in _shown(without, geometry.vertex_start, end).tolist():
         _project(geometry, m, first, last, q[first:last])
+    return q
+
+
+def _along_parallel_rays(geometry: Geometry, camera: Camera, base: int, stop: int | None) -> NDArray[np.float64]:
+    """`homogeneous` vertices for parallel rays."""
+    m = camera.P
+    m[2, :3], m[2, 3] = camera.R[2], camera.t[2]
+    q = projected(geometry, m, base, stop)
+    q[:, 3] = q[:, 2]
+    q[:, 2] = 1.0
     return q
 
 
@@ -257,9 +273,21 @@ def pixels_of(geometry: Geometry, corners: NDArray[np.float64], size: tuple[int,
 
 
 def lens_rays(camera: Camera) -> NDArray[np.float64] | None:
-    """The image's ray table, (H, W, 3); None for a pinhole. It is cached for the next frame, so do not write to it."""
+    """The image's ray table, (H, W, 3); None if rays are pixels (x, y, 1). It is cached for the next frame, so do not write to
+    it.
+    """
     image = (0, 0, camera.width, camera.height)
-    return None if camera.lens.is_linear else _ray_table(camera.intrinsics.model_dump_json(), 1, image).rays
+    return None if camera.lens.is_straight else _ray_table(camera.intrinsics.model_dump_json(), 1, image).rays
+
+
+def direction_matrix(camera: Camera) -> NDArray[np.float64]:
+    """Matrix (3, 3) from rays to their directions in camera axes: K^-1 for a pinhole, whose rays are pixels (x, y, 1); the axis
+    for parallel rays, which also are pixels; else the identity.
+    """
+    lens = camera.lens
+    if lens.is_parallel:
+        return np.diag((0.0, 0.0, 1.0))
+    return inverse_camera_matrix(camera.intrinsics) if lens.is_linear else np.eye(3)
 
 
 def lens_table(camera: Camera) -> RayTable:
@@ -339,6 +367,9 @@ def _draw(
     first, last, base, stop = part
     span = (first, last, base)
     cut = (seen_from(geometry, q, base).triangle_cutout, geometry.alpha_masks.arrays)
+    if camera.lens.is_parallel:
+        _draw_parallel(geometry, q, span, (samples, x0, y0), cut, nearest, seen)
+        return nearest, seen
     if not camera.lens.is_linear:
         canvas = _canvas(camera, window)
         t = _ray_table(camera.intrinsics.model_dump_json(), samples, canvas)
@@ -356,3 +387,34 @@ def _draw(
         cell[max(geometry.vertex_start[-1] - begin, 0) :] = kernels.BEHIND
         kernels.draw(own, cell, geometry.triangles, (first, last, begin), (samples, x0, y0), *cut, nearest, seen)
     return nearest, seen
+
+
+def _draw_parallel(
+    geometry: Geometry,
+    q: NDArray[np.float64],
+    span: tuple[int, int, int],
+    canvas: tuple[int, int, int],
+    cut: tuple[NDArray[np.int32], tuple[NDArray[Any], ...]],
+    nearest: NDArray[np.float64],
+    seen: NDArray[np.int32],
+) -> None:
+    """`_draw` along parallel rays."""
+    from viewsphere.truth.raster import kernels_parallel as kernels
+
+    with np.errstate(divide="ignore"):
+        np.divide(1.0, nearest, out=nearest)
+        kernels.draw(q, geometry.triangles, span, canvas, *cut, nearest, seen)
+        np.divide(1.0, nearest, out=nearest)
+
+
+def lens_rays_to(camera: Camera, inverse_depth: NDArray[np.floating]) -> NDArray[np.float64] | None:
+    """Rays r (H, W, 3) in camera axes from the camera's centre to the seen points: each point is r / inverse_depth.
+
+    They are `lens_rays`, or None for a pinhole. For parallel rays, which begin elsewhere, they depend on 1/s (H, W), and are
+    the axis where nothing is seen.
+    """
+    if not camera.lens.is_parallel:
+        return lens_rays(camera)
+    rays = camera.lens.origins() * inverse_depth[..., None]
+    rays[..., 2] = 1.0
+    return rays

@@ -13,9 +13,11 @@ Whole = NDArray[np.int32]
 
 
 def rays_through(view: View, xy: Float) -> Float:
-    """Rays (N, 3) through positions (N, 2): (x, y, 1) for a pinhole, otherwise as in `geometry.camera.pixel_rays`."""
+    """Rays (N, 3) through positions (N, 2): (x, y, 1) if straight lines stay straight, otherwise as in
+    `geometry.camera.pixel_rays`.
+    """
     lens = view.camera.lens
-    return np.column_stack((xy, np.ones(len(xy)))) if lens.is_linear else lens.rays(xy).directions
+    return np.column_stack((xy, np.ones(len(xy)))) if lens.is_straight else lens.rays(xy).directions
 
 
 def weights_of(view: View, triangle: Whole, rays: Float) -> Float:

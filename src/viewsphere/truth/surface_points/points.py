@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from viewsphere.geometry.camera import project
 from viewsphere.geometry.rotation import transform
+from viewsphere.truth.raster.visibility import direction_matrix
 from viewsphere.truth.surface_points.attached import rays_through, stick, weights_of
 from viewsphere.truth.surface_points.raster import Placed, first_met, in_lens, placed_at, states
 from viewsphere.truth.view import Body, View
@@ -102,7 +103,7 @@ def points_seen(view: View, xy: ArrayLike) -> SurfacePoints:
     has_ray = np.logical_and(inside, ~np.isnan(rays).any(axis=1))
     nowhere = np.full(len(xy), -1, np.int32)
     met = first_met(view, xy, np.zeros(len(xy)), nowhere, None if view.is_pinhole else rays, has_ray)
-    thing = np.where(has_ray & view.is_sky_endless, SKY, NOWHERE).astype(np.int32)
+    thing = np.where(has_ray & view.shows_directions, SKY, NOWHERE).astype(np.int32)
     first = np.array(view.geometry.triangle_start)
     hit = met >= 0
     thing[hit] = view.owners[met[hit]]
@@ -111,13 +112,16 @@ def points_seen(view: View, xy: ArrayLike) -> SurfacePoints:
     weights = np.zeros((len(xy), 3))
     weights[on] = weights_of(view, met[on], rays[on])
     triangle = np.where(on, met - first[np.maximum(thing, 0)], -1).astype(np.int32)
-    directions = transform(view.world_from_camera, transform(view.camera_from_ray, rays))
-    return SurfacePoints.from_weights(view, thing, triangle, weights, _fixed(view, thing, directions))
+    directions = transform(view.world_from_camera, transform(direction_matrix(view.camera), rays))
+    origins = view.center
+    if view.is_parallel:
+        origins = origins + transform(view.world_from_camera, view.camera.lens.rays(xy).origins)
+    return SurfacePoints.from_weights(view, thing, triangle, weights, _fixed(view, thing, origins, directions))
 
 
-def _fixed(view: View, thing: Whole, directions: Float) -> Float:
-    """Return the places where rays with these directions (N, 3) meet the ground, and the directions of sky points; 0 for all
-    others.
+def _fixed(view: View, thing: Whole, origins: Float, directions: Float) -> Float:
+    """Return the places where rays with these origins, (3,) or (N, 3), and directions (N, 3) meet the ground, and the
+    directions of sky points; 0 for all others.
     """
     place = np.zeros(directions.shape)
     sky, ground = thing == SKY, thing == GROUND
@@ -125,7 +129,8 @@ def _fixed(view: View, thing: Whole, directions: Float) -> Float:
     height = view.geometry.ground_z
     if height is not None:
         d = directions[ground]
-        place[ground] = view.center + d * ((height - view.center[2]) / d[:, 2])[:, None]
+        begin = origins if origins.ndim == 1 else origins[ground]
+        place[ground] = begin + d * ((height - begin[..., 2]) / d[:, 2])[:, None]
         place[ground, 2] = height
     return place
 
@@ -190,7 +195,7 @@ class _Tracked:
 
     @property
     def _is_sky(self) -> NDArray[np.bool_]:
-        return (self.points.body == SKY) & self.view.is_sky_endless
+        return (self.points.body == SKY) & self.view.shows_directions
 
     @property
     def _has_ground(self) -> bool:

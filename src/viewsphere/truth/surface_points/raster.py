@@ -76,6 +76,14 @@ def pixels_at(view: View, points: Float) -> tuple[Float, Float, Float | None]:
     return xy, near, None if view.is_pinhole else points * near[:, None]
 
 
+def positions_along(view: View, rays: Float, near: Float) -> Float:
+    """Positions (..., 2) in the view's picture of the points rays / near; NaN where the lens shows none."""
+    if not view.is_parallel:
+        return project(view.camera.intrinsics, rays)[0]
+    with np.errstate(all="ignore"):  # points at infinity, and places that a caller fills later
+        return project(view.camera.intrinsics, rays / near[..., None])[0]
+
+
 def states(placed: Sequence[Placed]) -> list[NDArray[np.uint8]]:
     """The states (...) uint8 of each set of points. All sets are in one view, so its triangles are drawn once."""
     from viewsphere.truth.surface_points import kernels_points as kernels
@@ -138,7 +146,7 @@ def _meetings(view: View, xy: Float, near: Float, own: Whole, cell: Whole, rays:
 
     The points are those whose pixel `cell` is not -1.
     """
-    if rays is None:
+    if rays is None or view.is_parallel:
         yield _meet(view, view.corners, view.boxes, (view.camera.width, view.camera.height), xy, near, own, cell)
         return
     index = np.flatnonzero(cell >= 0).astype(np.int32)
@@ -151,7 +159,10 @@ def _meetings(view: View, xy: Float, near: Float, own: Whole, cell: Whole, rays:
 def _meet(
     view: View, q: Float, box: Whole, size: tuple[int, int], xy: Float, near: Float, own: Whole, cell: Whole
 ) -> tuple[Whole, Whole]:
-    """`_meetings` for a pinhole of this size; q: `homogeneous` vertices of that pinhole, box: their pixels (`pixels_of`)."""
+    """`_meetings` for a pinhole or parallel rays, with a picture of this size; q: its `homogeneous` vertices, box: their pixels
+    (`pixels_of`).
+    """
+    from viewsphere.truth.raster import kernels_parallel
     from viewsphere.truth.surface_points import kernels_points as kernels
 
     geometry, (width, height) = view.geometry, size
@@ -165,7 +176,11 @@ def _meet(
     inside = kernels.sort(xy, near, (1.0 + GAP) / NEARER, own, cell, covered, ground, clear, *sorted_by)
     met = np.full(inside + FOUR, -1, np.int32)
     if inside:
-        kernels.meet(q, box, geometry.triangles, ground, *cut, size, start, points, nearest, met, number, far)
+        surfaces = q, box, geometry.triangles, ground, *cut, size, start, points, nearest, met, number
+        if view.is_parallel:
+            kernels_parallel.meet(*surfaces)
+        else:
+            kernels.meet(*surfaces, far)
     return order[:inside], met[:inside]
 
 

@@ -28,6 +28,7 @@ from viewsphere.truth.raster.kernels_draw import (
     hits_surface,
     plane,
 )
+from viewsphere.truth.raster.kernels_parallel import covers, depth_at, surface_of
 from viewsphere.truth.raster.kernels_rays import ANY_DEPTH, LEAF, NO_BOX, leaf_list, limits, pixel_box, touched
 
 U = nb.uintp
@@ -437,3 +438,62 @@ def _cast_box(surface, edges, box, rays, alpha_masks, triangles, points, solid, 
                 ray = rays[y * side + i // side, x * side + i % side]
                 _cast(surface, edges, (ray[0], ray[1], ray[2]), (U(k), U(i)), alpha_masks, triangles, solid, fragments)
             k += 1
+
+
+@njit
+def draw_parallel(q, order, triangles, cutout, alpha_masks, see_through, points, solid, fragments):
+    """The equivalent of `draw` along parallel rays, with vertices q of `kernels_parallel`.
+
+    `points` is (grid, pixels, offsets), `solid` (nearest, seen).
+    """
+    grid, pixels, _ = points
+    height, width = grid.shape
+    for n in range(U(order.shape[0])):
+        t = order[n]
+        ut = U(t)
+        i, j, k = U(triangles[ut, U(0)]), U(triangles[ut, U(1)]), U(triangles[ut, U(2)])
+        endless = cutout[ut] < NEVER
+        if cutout[ut] == NEVER or (not endless and max(q[i, U(3)], q[j, U(3)], q[k, U(3)]) <= 0.0):
+            continue
+        xa, ya, xb, yb = 0, 0, width - 1, height - 1
+        if not endless:
+            xa, xb = _pixels(min(q[i, U(0)], q[j, U(0)], q[k, U(0)]), max(q[i, U(0)], q[j, U(0)], q[k, U(0)]), width)
+            ya, yb = _pixels(min(q[i, U(1)], q[j, U(1)], q[k, U(1)]), max(q[i, U(1)], q[j, U(1)], q[k, U(1)]), height)
+        if xa > xb or ya > yb:
+            continue
+        area, edges, slope, bounds = surface_of(q, i, j, k, cutout[ut])
+        if area == 0.0:
+            continue
+        checked = cutout[ut] >= 0 or see_through[ut] or (not endless and abs(area) < SLIVER)
+        surface = t, cutout[ut], see_through[ut], checked, edges, slope, bounds
+        for y in range(ya, yb + 1):
+            p = first(grid, y, xa)
+            while pixels[p] <= y * width + xb:
+                _cast_parallel(surface, p, pixels[p] - y * width, y, points[2], alpha_masks, triangles, solid, fragments)
+                p += 1
+
+
+@inner
+def _pixels(low, high, size):
+    """First and last of `size` pixels with points between two places."""
+    return math.floor(min(max(low - EPSILON, 0.0), float(size))), math.floor(min(max(high + EPSILON, -1.0), size - 1.0))
+
+
+@inner
+def _cast_parallel(surface, p, x, y, offsets, alpha_masks, triangles, solid, fragments):
+    """Draw a surface at the points of chosen pixel p."""
+    t, cutout, is_see_through, checked, edges, slope, bounds = surface
+    nearest, seen = solid
+    for m in range(nearest.shape[1]):
+        px, py = x + offsets[0, m], y + offsets[1, m]
+        inside, e0, e1, e2 = covers(edges, checked, px, py)
+        z = depth_at(slope, bounds, px, py)
+        if not inside or z <= 0.0:
+            continue
+        inverse, at = 1.0 / z, (U(p), U(m))
+        if is_see_through:
+            if inverse * (1.0 + TIE) >= nearest[at] and hits_surface(alpha_masks, cutout, e0, e1, e2):
+                _insert(t, inverse, at, triangles, fragments)
+        elif _is_before(inverse, t, nearest[at], seen[at]) and hits_surface(alpha_masks, cutout, e0, e1, e2):
+            nearest[at] = inverse
+            seen[at] = t

@@ -51,8 +51,8 @@ class Samples:
     """Four samples of each edge pixel.
 
     pixels (E,) int32: flat indices, each once. The others have four rows per pixel: position (4E, 2) float32 in pixels; rays
-    (4E, 3) float32, camera axes, empty for a pinhole; triangle (4E,) int32, -1 if none; inverse_depth (4E,) float32 as in
-    `Visibility`.
+    (4E, 3) float32, camera axes, empty for a pinhole and for parallel rays; triangle (4E,) int32, -1 if none; inverse_depth
+    (4E,) float32 as in `Visibility`.
     """
 
     pixels: Int32
@@ -271,6 +271,10 @@ class _Points:
         fragments = self.inverses, self.listed, self.counts, q
         surfaces = order, geometry.triangles, geometry.triangle_cutout, geometry.alpha_masks.arrays, see_through
         if not lens.is_linear:
+            if lens.is_parallel:
+                shown, offsets = (self.nearest, self.seen), _CENTER if count == 1 else _ROTATED
+                kernels.draw_parallel(q, *surfaces, (self.grid, self.pixels, offsets), shown, fragments)
+                return
             side = 1 if count == 1 else 2
             table = lens_table(self.camera) if side == 1 else _sample_table(self.camera.intrinsics.model_dump_json())
             solid = self.nearest, self.seen
@@ -366,6 +370,8 @@ def _differing(count: int, *known: NDArray[Any]) -> tuple[Int32, Float32, Int32,
 
 
 def _sample_rays(camera: Camera, pixels: Int32) -> Float32:
+    if camera.lens.is_parallel:
+        return np.zeros((0, 3), np.float32)
     y, x = np.divmod(pixels, camera.width)
     table, quarter = _sample_table(camera.intrinsics.model_dump_json()).rays, np.arange(4)
     return table[2 * y[:, None] + quarter // 2, 2 * x[:, None] + quarter % 2].reshape(-1, 3).astype(np.float32)

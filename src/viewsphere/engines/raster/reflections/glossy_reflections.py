@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from viewsphere.engines.raster.materials.kernels_material import L_ROUGH, L_ROUGH_TEXEL
 from viewsphere.engines.raster.records import Float32
 from viewsphere.engines.raster.reflections import kernels_mirror
-from viewsphere.engines.raster.reflections.mirroring import blurred, looked_at, lying, mirrored
+from viewsphere.engines.raster.reflections.mirroring import blurred, is_above, looked_at, lying, mirrored
 from viewsphere.engines.raster.shading import kernels_paint, kernels_split
 from viewsphere.engines.raster.shading.painting import Baked, view_of
 from viewsphere.model.sensors.camera import Camera
@@ -79,7 +79,7 @@ def _mirror(baked: Baked, camera: Camera, visibility: Visibility) -> tuple[NDArr
     if len(at) < LEAST * len(shown):
         return at[:0], 0.0
     _, place = looked_at(camera, visibility, at)
-    is_below = place[:, 2] < camera.center[2] - THICK
+    is_below = is_above(camera, place[:, 2] + THICK)
     at, height = at[is_below], place[is_below, 2]
     if not len(at):
         return at, 0.0

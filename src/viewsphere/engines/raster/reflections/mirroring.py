@@ -16,7 +16,7 @@ from viewsphere.geometry.camera import inverse_camera_matrix
 from viewsphere.model.sensors.camera import Camera
 from viewsphere.truth.raster.alpha_masks import NEVER
 from viewsphere.truth.raster.geometry import Geometry, with_both_sides
-from viewsphere.truth.raster.visibility import Visibility, lens_rays, rasterize
+from viewsphere.truth.raster.visibility import Visibility, lens_rays_to, rasterize
 
 Float = NDArray[np.float64]
 
@@ -46,13 +46,23 @@ def looked_at(camera: Camera, visibility: Visibility, at: NDArray[np.intp]) -> t
     """Cosines (n,) of the angles between these pixels' rays and the vertical, and the world places (n, 3) where
     the rays end.
     """
-    rays, camera_from_pixel = lens_rays(camera), inverse_camera_matrix(camera.intrinsics)
+    rays, camera_from_pixel = lens_rays_to(camera, visibility.inverse_depth), inverse_camera_matrix(camera.intrinsics)
     table = np.zeros((0, 3)) if rays is None else rays.reshape(-1, 3)
     table.setflags(write=False)  # same type as for a lens, for one compilation
     cosine, place = np.empty(len(at)), np.empty((len(at), 3))
     pose, depth = (camera.R, camera.center), visibility.inverse_depth.reshape(-1)
     kernels.meet(at, camera.width, table, camera_from_pixel, *pose, depth, cosine, place)
+    if camera.lens.is_parallel:
+        cosine[:] = max(-camera.R[2, 2], 0.0)
     return cosine, place
+
+
+def is_above(camera: Camera, height: NDArray[np.float64] | float) -> NDArray[np.bool_]:
+    """Return whether the camera may see level surfaces at these heights from above."""
+    height = np.asarray(height, np.float64)
+    if camera.lens.is_parallel:
+        return np.full(height.shape, camera.R[2, 2] < 0)
+    return height < camera.center[2]
 
 
 def mirrored(baked: Baked, camera: Camera, plane: float, left_out: NDArray[np.bool_], at: NDArray[np.intp]) -> _Mirrored:

@@ -74,7 +74,8 @@ def mirror_in_panes(
         at = panes[start : start + SOME]
         gloss = np.empty((len(at), kernels_split.GLOSS), np.float32)
         kernels_split.gloss(view, baked.surfaces, baked.textures, baked.floor, *light, at, triangle, depth, gloss)
-        width = (view.pixel * view.scale / depth[at]).astype(np.float32)
+        away = np.ones(len(at)) if len(view.shifts) else 1 / depth[at]
+        width = (view.pixel * view.scale * away).astype(np.float32)
         if baked.is_fine:
             toward, normals = _facing(view, gloss)
             shown, is_known = _seen_in_lobes(baked, baked.bounce_scene, baked.tree, view, (toward, normals), gloss, at, width)
@@ -82,7 +83,7 @@ def mirror_in_panes(
             shown = kernels_mirror.shared(at, normals, made_of, gloss, shown, is_known, camera.width)
         else:
             sights = gloss[:, 7:10].copy(), gloss[:, 10:13].copy(), width
-            shown, is_known = _seen(baked, baked.bounce_scene, baked.tree, sights, float(view.pixel))
+            shown, is_known = _seen(baked, baked.bounce_scene, baked.tree, sights, view.spread)
         at, gloss, shown = at[is_known].astype(np.intp), gloss[is_known], shown[is_known]
         nearness = np.zeros(len(at), np.float32)
         kernels_mirror.polish(at, gloss, shown, shown, nearness, depth, *map(np.float32, borders), radiance)
@@ -90,7 +91,7 @@ def mirror_in_panes(
 
 def _facing(view: PictureRays, gloss: Float32) -> tuple[Float32, Float32]:
     """Directions towards the viewer, and normals, (n, 3) each; gloss (n, 13): see `kernels_split.gloss`."""
-    toward = view.eye - gloss[:, 7:10]
+    toward = np.tile(-view.rotation[2], (len(gloss), 1)) if len(view.shifts) else view.eye - gloss[:, 7:10]
     toward /= np.sqrt((toward * toward).sum(axis=1, keepdims=True))
     normals = toward + gloss[:, 10:13]
     return toward, normals / np.maximum(np.sqrt((normals * normals).sum(axis=1, keepdims=True)), np.float32(1e-6))
@@ -118,7 +119,7 @@ def _seen_in_lobes(
         chunk = slice(start, start + SOME // LOBE_RAYS)
         ways, weights = lobe_rays(toward[chunk], normals[chunk], gloss[chunk, 6], at[chunk], int(view.columns), LOBE_RAYS)
         sights = np.tile(gloss[chunk, 7:10], (LOBE_RAYS, 1)), ways.reshape(-1, 3), np.tile(width[chunk], LOBE_RAYS)
-        seen, is_known = _seen(baked, bounce_scene, tree, sights, float(view.pixel))
+        seen, is_known = _seen(baked, bounce_scene, tree, sights, view.spread)
         total = weights.sum(axis=0)
         each = np.where(is_known.reshape(*weights.shape, 1), seen.reshape(*weights.shape, 3), taken[chunk])
         shown[chunk] = (weights[..., None] * each).sum(axis=0) / np.maximum(total, np.float32(1e-6))[:, None]

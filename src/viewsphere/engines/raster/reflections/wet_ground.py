@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from viewsphere.assets.appearance.wetting import FILM
 from viewsphere.engines.raster.records import Float32
-from viewsphere.engines.raster.reflections.mirroring import blurred, looked_at, lying, mirrored
+from viewsphere.engines.raster.reflections.mirroring import blurred, is_above, looked_at, lying, mirrored
 from viewsphere.engines.raster.shading import kernels_paint, kernels_split
 from viewsphere.engines.raster.shading.painting import Baked, view_of
 from viewsphere.model.annotations.classes import STUFF_IDS
@@ -50,7 +50,7 @@ def mirror_in_water(baked: Baked, camera: Camera, visibility: Visibility, wet: W
     """Add the reflections of wet ground to `radiance` (H * W, 4) of a picture, in place."""
     geometry, shown = baked.geometry, visibility.triangle.reshape(-1)
     plane = 0.0 if geometry.has_scenery or geometry.ground_z is None else geometry.ground_z  # places have their ground at 0
-    if camera.center[2] <= plane + LOW:
+    if not is_above(camera, plane + LOW):
         return
     low = lying(geometry, plane + LOW)
     is_mirror = low & (baked.surfaces.normals[:, 2] > LEVEL) & np.isin(geometry.triangle_class, PAVED)

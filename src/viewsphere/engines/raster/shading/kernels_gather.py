@@ -119,6 +119,13 @@ def locate(view, start, count, slots, depth, b, own):
         b[U(T2) + i] = depth[U(own[i])]
     _rays(view, count, own, b)
     _aim(count, view.eye, view.rotation, view.scale, view.pixel, b)
+    if view.shifts.shape[0] > 0:
+        for i in range(U(count)):
+            shift = view.shifts[U(own[i])]
+            b[U(PX) + i] += shift[0]
+            b[U(PY) + i] += shift[1]
+            b[U(PZ) + i] += shift[2]
+            b[U(PIXEL) + i] = view.scale * view.pixel
 
 
 @lanewise

@@ -153,7 +153,7 @@ def _smooth(
     own = Samples(samples.pixels[rows], places, rays, triangle, inverse)
     view = view_of(baked, camera, own)
     colors, parts = np.empty((count, 4), np.float32), np.zeros((count if len(split) else 0, split.shape[1]), np.float32)
-    air = None if fog is None else Air.for_camera(fog, camera, _rays(camera, own), is_outdoors)
+    air = None if fog is None else Air.for_camera(fog, camera, _rays(camera, own), is_outdoors, own.position)
     shade_all(baked, camera, view, visibility, own.triangle, own.inverse_depth, colors, parts, own, air)
     if has_sky:
         colors[is_other, 3] = 1  # the sky need not be looked up for these
@@ -238,6 +238,8 @@ def _lay_sky(view: PictureRays, surrounding: Surrounding, radiance: Float32, air
 
 def _rays(camera: Camera, samples: Samples) -> NDArray[np.floating]:
     """The rays (S, 3) of samples, in the camera's axes."""
+    if camera.lens.is_parallel:
+        return np.tile([0.0, 0.0, 1.0], (len(samples.position), 1))
     if len(samples.rays):
         return samples.rays
     at = np.column_stack([samples.position, np.ones(len(samples.position))])
@@ -272,11 +274,14 @@ def _shade_some(
 
 def view_of(baked: Baked, camera: Camera, samples: Samples | None = None) -> PictureRays:
     """The rays of a camera's pixel centres, or of these samples."""
-    rays, places = _NO_RAYS, _NO_PLACES
+    rays, places, shifts = _NO_RAYS, _NO_PLACES, _NO_RAYS
     table = lens_rays(camera)
+    if camera.lens.is_parallel:
+        shifts = _shifts(baked, camera, samples)
+        rays = np.tile(np.array([0, 0, 1], np.float32), (len(shifts), 1))
     if table is not None:
         rays = (table if samples is None else samples.rays).astype(np.float32).reshape(-1, 3)
-    elif samples is not None:
+    if samples is not None and table is None:
         places = samples.position
     return PictureRays(
         ((camera.center - baked.origin) / baked.unit).astype(np.float32),
@@ -287,4 +292,12 @@ def view_of(baked: Baked, camera: Camera, samples: Samples | None = None) -> Pic
         np.float32(1 / np.sqrt(camera.intrinsics.fx * camera.intrinsics.fy)),
         np.float32(1 / baked.unit),
         places,
+        shifts,
     )
+
+
+def _shifts(baked: Baked, camera: Camera, samples: Samples | None) -> Float32:
+    """From the eye to where the parallel rays of pixel centres, or of these samples, begin, (S, 3) in the stage's axes."""
+    lens = camera.lens
+    begin = lens.origins().reshape(-1, 3) if samples is None else lens.rays(samples.position).origins
+    return (begin @ camera.R / baked.unit).astype(np.float32)

@@ -205,12 +205,12 @@ def sky_behind(view: PictureRays, surrounding: Surrounding, radiance: Float32) -
         lens[:2] = view.lens
         to_map = to_map @ lens
     # The mip level of the picture whose texels are about as large as a pixel.
-    texels = float(view.pixel) * float(surrounding.picture_levels[0, 1]) / (2 * math.pi)
+    texels = view.spread * float(surrounding.picture_levels[0, 1]) / (2 * math.pi)
     level = min(math.floor(math.log2(max(texels, 1.0)) + 0.5), len(surrounding.picture_levels) - 1)
     sun, numbers = surrounding.sun, np.zeros((9, 3), np.float32)
     numbers[:3], numbers[3] = to_map, turn @ sun[0]
     numbers[4], numbers[5] = surrounding.light[kernels.SCALE], surrounding.light[kernels.BEHIND]
-    numbers[6:8], numbers[8, :2] = sun[1:], (surrounding.half_angle, 1 / max(view.pixel, 1e-6))
+    numbers[6:8], numbers[8, :2] = sun[1:], (surrounding.half_angle, 1 / max(view.spread, 1e-6))
     kernels.lay_over_sky(
         view.rays if has_rays else view.places, np.int32(view.columns), numbers.ravel(), surrounding.picture,
         *surrounding.picture_levels[level], np.empty(kernels.ROWS * kernels.CHUNK, np.float32), radiance,

@@ -80,6 +80,13 @@ def stereo(scope: Scope) -> Iterator[str]:
         yield f"expected two rectified cameras (rig: {{kind: stereo, baseline: 0.1}}); found {found}"
 
 
+def central(scope: Scope) -> Iterator[str]:
+    """Reasons to refuse, for a format whose cameras have a centre through which all rays pass."""
+    for name, lens in lenses(scope):
+        if lens.lens.is_parallel:
+            yield f"expected cameras whose rays pass through one centre; found {lens.lens.name} of {name}"
+
+
 def pinhole(scope: Scope) -> Iterator[str]:
     """Reasons to refuse, for a format without lens distortion."""
     for name, lens in lenses(scope):

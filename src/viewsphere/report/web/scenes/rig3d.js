@@ -13,15 +13,19 @@ function lines(points, tone, opacity = 1) {
 
 const center = (frame) => [3, 7, 11].map((i) => frame.worldFromCamera[i]);
 
-/** A pyramid from the sensor's centre to its picture, so far ahead; a LiDAR's shows where ahead is. */
+/** A pyramid from the sensor's centre to its picture, so far ahead, or a box if its rays are parallel; a LiDAR's shows where ahead is. */
 function frustum(frame, size) {
   const m = frame.worldFromCamera;
   const { K } = frame.camera;
   const { width, height } = frameSize(frame);
   const place = (p) => [0, 4, 8].map((row) => m[row] * p[0] + m[row + 1] * p[1] + m[row + 2] * p[2] + m[row + 3]);
-  const corner = frame.scan ? (u, v) => place([(u / width - 0.5) * 0.4 * size, (v / height - 0.5) * 0.4 * size, size]) : (u, v) => place([((u - K[0][2]) / K[0][0]) * size, ((v - K[1][2]) / K[1][1]) * size, size]);
-  const ring = [corner(0, 0), corner(width, 0), corner(width, height), corner(0, height)];
-  return ring.flatMap((p, i) => [...center(frame), ...p, ...p, ...ring[(i + 1) % 4]]);
+  const { parallel } = frame.camera;
+  const spread = parallel ? 1 : size;
+  const beside = frame.scan ? (u, v) => [(u / width - 0.5) * 0.4 * size, (v / height - 0.5) * 0.4 * size] : (u, v) => [((u - K[0][2]) / K[0][0]) * spread, ((v - K[1][2]) / K[1][1]) * spread];
+  const ringAt = (z) => [[0, 0], [width, 0], [width, height], [0, height]].map(([u, v]) => place([...beside(u, v), z]));
+  const ring = ringAt(size);
+  const begin = parallel ? ringAt(0) : ring.map(() => center(frame));
+  return ring.flatMap((p, i) => [...begin[i], ...p, ...p, ...ring[(i + 1) % 4], ...(parallel ? [...begin[i], ...begin[(i + 1) % 4]] : [])]);
 }
 
 const edgesOf = (corners) => box.edges.flatMap(([a, b]) => [...corners.slice(3 * a, 3 * a + 3), ...corners.slice(3 * b, 3 * b + 3)]);

@@ -79,4 +79,6 @@ def _seen_at(view: PictureRays, slots: Int32, depth: Float32) -> tuple[Float32, 
         rays[:, :2] = at @ view.lens[:, :2].T + view.lens[:, 2]
     rays = rays @ view.rotation
     places = view.eye + rays * (view.scale / depth[slots])[:, None]
+    if len(view.shifts):
+        places += view.shifts[slots]
     return places.astype(np.float32), rays.astype(np.float32)

@@ -1,0 +1,68 @@
+"""Checks that the parts of a recipe support the lenses of its sensors."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from viewsphere import plugins
+from viewsphere.composing.viewpoints.poses import Poses
+from viewsphere.errors import RecipeError
+from viewsphere.labels import is_channel, label_named
+from viewsphere.model.channel import PASSES
+from viewsphere.model.sensors.rig import Rig
+from viewsphere.plugins.engine import EngineSpec
+from viewsphere.recipe.draws import alternatives, span
+from viewsphere.recipe.recipe import Recipe
+
+OF_PINHOLES = ("depth_of_field", "edge_highlight")
+"""Effects that follow from the distances of a pinhole's pictures."""
+
+
+def check_lenses(recipe: Recipe, rig: Rig) -> None:
+    """Check that labels, the engine, weather and effects support the lenses of the rig's sensors."""
+    for name, wrong in _limits(recipe, rig):
+        raise RecipeError(f"{name}: {wrong}")
+
+
+def check_fill(recipe: Recipe, rig: Rig, views: Poses) -> None:
+    """Check that no viewpoint asks for a filled share of the picture, where a picture's width does not follow from distance."""
+    lens = rig.sensors[0].intrinsics.lens
+    if lens.is_parallel and any(views.fill(i) is not None for i in range(min(len(views), 1))):
+        raise RecipeError(
+            f"viewpoints.distance: expected metres beside projection: {lens.name}, whose pictures show as much from any "
+            "distance; found fill: set camera.width_m to the width that the picture spans"
+        )
+
+
+def _limits(recipe: Recipe, rig: Rig) -> Iterator[tuple[str, str]]:
+    """The recipe's fields that lenses rule out, each with the reason."""
+    for sensor in rig.sensors:
+        kept = sensor.kept_channels(tuple(recipe.channels))
+        for name in (*kept, *recipe.annotations):
+            label = label_named(name)
+            reason = label.refuses(sensor.intrinsics) if label is not None and label.refuses is not None else None
+            if reason is not None:
+                yield "channels" if is_channel(name) else "annotations", f"{name}: {reason}"
+        lens = sensor.intrinsics.lens
+        if lens.is_parallel and any(name in PASSES for name in kept):
+            yield from _of_pictures(recipe, lens.name)
+
+
+def _of_pictures(recipe: Recipe, lens: str) -> Iterator[tuple[str, str]]:
+    """The fields that parts of pictures with parallel rays rule out."""
+    if not plugins.load(EngineSpec, recipe.engine.name).parallel_rays:
+        yield (
+            "engine",
+            (f"expected one that paints parallel rays beside projection: {lens}; found {recipe.engine.name}: take raster"),
+        )
+    for condition in recipe.conditions.values():
+        scene = condition.scene
+        for name in ("rain", "snow"):
+            if any(value != "off" for value in alternatives(getattr(scene, name))):
+                yield (
+                    f"scene.{name}",
+                    f"expected off beside projection: {lens}, whose rays begin far apart; found {name}",
+                )
+        for name in OF_PINHOLES:
+            if any(span(value)[1] > 0 for value in alternatives(getattr(scene.effects, name))):
+                yield f"scene.effects.{name}", f"expected 0 beside projection: {lens}, as it is made for a pinhole; found more"

@@ -1,0 +1,144 @@
+"""An orthographic camera of a recipe: its errors, a data set that is checked, and every format's answer."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+
+from cube_dataset import make
+from small import small_recipe
+from truth_scenes import PARALLEL
+from viewsphere import Dataset, Recipe, generate, plan, plugins
+from viewsphere.check import check
+from viewsphere.errors import RecipeError, UserError
+from viewsphere.labels.box3d import LABEL
+from viewsphere.model.sensors.camera import Intrinsics
+from viewsphere.plugins.format import FormatSpec
+from viewsphere.recipe.formats import FormatEntry
+from viewsphere.run.exports.exporting import write
+from viewsphere.run.exports.scope import not_held, refuse, scope_of
+from viewsphere.run.reports.rig_view import recipe_rig, rig_lines, rig_mesh
+
+CAMERA = {"size": [96, 72], "projection": "orthographic", "width_m": 0.32}
+CHANNELS = [
+    "rgb", "depth", "depth_ray", "instances", "normals", "position", "barycentrics", "coordinates", "nocs", "voxels",
+]  # fmt: skip
+WIDE = Intrinsics(width=96, height=72, fx=40, fy=40, cx=48, cy=36, distortion=PARALLEL)
+
+
+def parallel_recipe(**changes) -> Recipe:
+    return small_recipe(**{"camera": CAMERA, "channels": CHANNELS, **changes})
+
+
+def test_its_width_gives_square_pixels_and_is_written_as_it_was_given():
+    recipe = parallel_recipe()
+    lens = recipe.camera.intrinsics
+    assert (lens.fx, lens.fy, lens.cx, lens.cy, lens.lens.name) == (300, 300, 48, 36, "orthographic")
+    written = recipe.camera.model_dump(mode="json", exclude_defaults=True)
+    assert written == CAMERA and parallel_recipe(camera=written).digest == recipe.digest
+
+
+@pytest.mark.parametrize(
+    "camera, told",
+    [
+        ({"width_m": 0}, "camera.width_m: expected a number greater than 0; found 0"),
+        ({"width_m": -1}, "camera.width_m: expected a number greater than 0; found -1"),
+        ({"width_m": float("nan")}, "camera.width_m: expected a finite number; found nan"),
+        ({"width_m": float("inf")}, "camera.width_m: expected a finite number; found inf"),
+        ({"width_m": None}, "camera.width_m: "),
+        ({"fov_deg": 30}, "camera.fov_deg: expected none beside projection: orthographic"),
+        ({"distortion": {"model": "fisheye", "coefficients": [0, 0, 0, 0]}}, "camera.distortion: expected none beside proj"),
+    ],
+)
+def test_a_wrong_camera_is_one_line(camera, told):
+    with pytest.raises(RecipeError, match=told) as error:
+        parallel_recipe(camera={**CAMERA, **camera})
+    assert "\n" not in str(error.value)
+
+
+STEREO = {"kind": "stereo", "baseline": 0.1}
+
+
+@pytest.mark.parametrize(
+    "changes, told",
+    [
+        (
+            {"rig": STEREO, "channels": ["rgb", "disparity"]},
+            "channels: disparity: expected a lens whose rays pass through one centre; found orthographic, whose disparity is "
+            "constant, baseline x 300 pixels a metre: leave it out",
+        ),
+        ({"rig": STEREO, "channels": ["rgb", "disparity_state"]}, "channels: disparity_state: expected a lens whose rays"),
+        (
+            {"channels": ["rgb", "depth_sensor"]},
+            "channels: depth_sensor: expected .* as range cameras have; found ortho",
+        ),
+        ({"engine": "cycles"}, "engine: expected one that paints parallel rays beside projection: orthographic; found cycles"),
+        ({"scene": {"rain": 5}}, "scene.rain: expected off beside projection: orthographic"),
+        ({"scene": {"effects": {"depth_of_field": 0.5}}}, "scene.effects.depth_of_field: expected 0 beside projection"),
+        ({"scene": {"effects": {"edge_highlight": 0.5}}}, "scene.effects.edge_highlight: expected 0 beside projection"),
+    ],
+)
+def test_what_it_cannot_have_is_one_line_before_anything_is_rendered(changes, told):
+    with pytest.raises(RecipeError, match=told) as error:
+        plan(parallel_recipe(**changes))
+    assert "\n" not in str(error.value)
+
+
+def test_a_stereo_rig_of_it_has_all_other_labels():
+    assert plan(parallel_recipe(rig=STEREO)).frames == 24
+
+
+def test_a_data_set_of_it_is_proved_and_read_back(tmp_path):
+    generate(
+        parallel_recipe(formats=["native", "coco", "pointcloud"], annotations=["amodal", "obb"]), tmp_path / "out", workers=0
+    )
+    dataset = Dataset(tmp_path / "out")
+    report = check(dataset, repaint=2)
+    assert not report.findings, report.findings
+    assert report.checked["surface"] == len(dataset)
+    sample = dataset[0]
+    assert sample.camera.lens.name == "orthographic" and sample.camera.P[2].tolist() == [0, 0, 0, 1]
+    homogeneous = np.column_stack([sample.objects[0].box3d, np.ones(8)]) @ sample.camera.P.T
+    assert np.allclose(homogeneous[:, :2], sample.objects[0].box3d_pixels, rtol=0, atol=1e-9)
+    cloud = sample.point_cloud(axes="world")
+    assert np.abs(cloud.points - sample.position[np.isfinite(sample.depth)]).max() < 1e-6
+    coco = next((tmp_path / "out" / "coco" / "annotations").glob("instances_train*.json"))
+    assert '"model": "orthographic"' in json.dumps(json.loads(coco.read_text("utf-8")))
+
+
+def test_a_tampered_pixel_is_found(tmp_path):
+    """A depth that is 1 % off, and a box a pixel off, contradict the exported models."""
+    generate(parallel_recipe(formats=[]), tmp_path / "out", workers=0)
+    sample = Dataset(tmp_path / "out")[0]
+    assert not list(LABEL.prove(sample, {}))
+    sample.objects[0].box3d_pixels[2] += 1
+    assert any("px off P x vertex" in found for found in LABEL.prove(sample, {}))
+
+
+def test_every_format_holds_it_or_refuses_it_with_words(tmp_path):
+    """From the registry: a format says whether it holds parallel rays, and refuses cameras without a centre otherwise."""
+    dataset = make(tmp_path / "out", several=True, intrinsics=WIDE)
+    scope, held = scope_of(dataset), []
+    for name, spec in plugins.loadable(FormatSpec).items():
+        if spec.writer is None:
+            continue
+        entry = FormatEntry(name=name)
+        reasons = [reason for reason in not_held(spec, entry, scope) if "orthographic of camera" in reason]
+        assert bool(reasons) == (not spec.parallel_rays), name
+        if reasons:
+            with pytest.raises(UserError, match=f"format {name}: .*expected cameras whose rays pass through one centre"):
+                refuse([entry], scope, "x")
+        elif not list(not_held(spec, entry, scope)):
+            held.append(name)
+            (tmp_path / name).mkdir()
+            write(dataset, [(entry, tmp_path / name)])
+    assert len(held) > 5
+
+
+def test_a_camera_s_picture_and_words_show_a_box_instead_of_a_pyramid():
+    rig = recipe_rig(parallel_recipe())
+    assert any("96 x 72, 0.32 x 0.24 m, orthographic" in line for line in rig_lines(rig))
+    low, high = rig_mesh(rig).bounds
+    assert np.isfinite([low, high]).all() and (np.subtract(high, low) > 0).all()
