@@ -40,6 +40,7 @@ from viewsphere.labels import (
 )
 from viewsphere.limits import table
 from viewsphere.model.channel import ALL_PICTURES, PASSES
+from viewsphere.plugins.effect import EffectSpec
 from viewsphere.plugins.engine import EngineSpec
 from viewsphere.plugins.format import FormatSpec
 from viewsphere.plugins.material import MaterialSpec
@@ -259,12 +260,23 @@ def model_files_page() -> str:
 FIELDS = re.compile(r"(<!-- fields of (.+?), written by scripts/docs -->\n).*?(?=\n<!-- end -->)", re.DOTALL)
 
 
+EFFECTS = re.compile(r"(<!-- effects, written by scripts/docs -->\n).*?(?=\n<!-- end -->)", re.DOTALL)
+
+
 def recipe_page() -> str:
-    """The hand-written page with its tables of fields as the schema has them."""
+    """The hand-written page with its tables of fields as the schema has them, and the table of effects."""
     entries = schema()["$defs"]
-    return FIELDS.sub(
+    page = FIELDS.sub(
         lambda found: found[1] + fields_table(entries, found[2].split(", ")), (DOCS / "recipe.md").read_text("utf-8")
     )
+    return EFFECTS.sub(lambda found: found[1] + effects_table(), page)
+
+
+def effects_table() -> str:
+    """The effects of viewsphere in the order of the light path."""
+    found = sorted((plugins.load(EffectSpec, name) for name in plugins.shipped("effects")), key=lambda spec: spec.place)
+    rows = (f"| `{spec.name}` | {spec.stage} | {spec.strongest} |\n" for spec in found)
+    return "\n| effect | stage | at strength 1 |\n|---|---|---|\n" + "".join(rows)
 
 
 def fields_table(entries: dict[str, Any], named: list[str]) -> str:

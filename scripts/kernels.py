@@ -17,15 +17,17 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
 from types import ModuleType
 from typing import Any
 
+from viewsphere import plugins
 from viewsphere.kernels import overloads
 from viewsphere.kernels.overloads import Overload
+from viewsphere.plugins.effect import EffectSpec
 
 ROOT = Path(__file__).resolve().parents[1]
 PLAIN: dict[str, Any] = {
@@ -49,14 +51,16 @@ VARIANTS: Mapping[str, dict[str, Any]] = {
     "fisheye": {
         "camera": {"fov_deg": 90, "size": [64, 48], "distortion": {"model": "fisheye", "coefficients": [0.01, 0.0, 0, 0]}}
     },
-    "blur": {"scene": {"effects": {"blur": 0.5}}},
-    "color": {"scene": {"effects": {"saturation": 0.2, "brightness": 0.1, "contrast": 0.1, "hue": 0.1}}},
-    "noise": {"scene": {"effects": {"shot_noise": 0.2, "read_noise": 0.1}}},
-    "lens": {"scene": {"effects": {"vignetting": 0.3, "chromatic_aberration": 0.2}}},
-    "focus": {"scene": {"effects": {"depth_of_field": 0.5}}},
     "background": {"scene": {"background": {"color": "#808080"}, "ground": "off"}},
     "transparent": {"scene": {"background": {"transparent": True}}},
 }
+
+
+def effects() -> Iterator[dict[str, Any]]:
+    """Recipes with effects: those that one function computes are in one recipe."""
+    specs = [plugins.load(EffectSpec, name) for name in plugins.shipped("effects")]
+    for options in dict.fromkeys(spec.options for spec in specs):
+        yield {"scene": {"effects": {spec.name: 0.2 for spec in specs if spec.options is options}}}
 
 
 def used() -> set[str]:
@@ -156,7 +160,7 @@ def main() -> None:
             print(json.dumps({"tiny": tiny, "small": small}[kind](recipe)))
         return
     recipes = [] if args.add else [str(file) for file in sorted((ROOT / "recipes").rglob("*.yaml"))]
-    texts = [*map(json.dumps, VARIANTS.values()), *recipes]
+    texts = [*map(json.dumps, (*VARIANTS.values(), *effects())), *recipes]
     with ThreadPoolExecutor(args.jobs) as pool:
         runs = [each for each in pool.map(run, [(kind, text) for kind in ("tiny", "small") for text in texts]) if each]
     kept = {each.name: each for each in overloads.table()} if args.add else {}

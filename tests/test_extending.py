@@ -15,6 +15,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import yaml
 from PIL import Image
 
 import viewsphere_zoo as zoo
@@ -33,6 +34,7 @@ from viewsphere.formats import coco
 from viewsphere.labels import LabelSpec
 from viewsphere.planning.models import model_specs
 from viewsphere.plugins.format import FormatSpec
+from viewsphere.rendering.effects import steps_of
 from viewsphere.run.exports.exporting import export
 from viewsphere.run.exports.writable import writable_formats
 from viewsphere.run.reports import plugin_list
@@ -330,6 +332,7 @@ GROUPS = {
     "dots": ("materials", "dots"),
     "tri": ("readers", "Triangles as text"),
     "ring": ("lights", "ring"),
+    "hot_pixels": ("effects", "hot_pixels"),
     "parts": ("sources", "Our library of parts"),
     "peg": ("families", "Pegs that stand on a foot."),
     "pegs": ("places", "A pair of pegs on an empty floor."),
@@ -341,7 +344,7 @@ INSTALLED = """
 models: [{source: "zoo:peg", count: 3}, {source: "parts/*.tri", category: part}, {source: "zoo:box", category: box}]
 viewpoints: {azimuth: [0, 40], elevation: 20, distance: 2}
 camera: {size: [96, 72], fov_deg: 40, distortion: {model: division, k: -0.3}}
-scene: {ground: {material: dots}, lights: {kind: ring, position: [0, 0, 1], strength: 4}}
+scene: {ground: {material: dots}, lights: {kind: ring, position: [0, 0, 1], strength: 4}, effects: {hot_pixels: [0.1, 1]}}
 channels: [rgb, instances, borders]
 formats: [csv_boxes, lines]
 splits: {by: frame, train: 1}
@@ -713,6 +716,138 @@ def test_a_light_without_a_kind_is_refused_by_name(install):
     message = r"LightSpec\.options: expected a class with the fields kind, count, strength, color; found no count"
     with pytest.raises(PluginError, match=f"^{re.escape(str(file))}: {message}"):
         lit(RING)
+
+
+HOT = {"hot_pixels": [0.2, 0.9], "hot_pixels_level": {"choice": [0.25, 1]}, "blur": 0.1, "jpeg": 0.2}
+
+
+def affected(effects, **fields):
+    """A recipe of few frames with effects."""
+    return small_recipe(scene={"effects": effects}, formats=[], **fields)
+
+
+def test_an_effect_is_one_file(install, tmp_path):
+    plain = {sample.index: sample for sample in render(affected({"blur": 0.1, "jpeg": 0.2}))}
+    old = affected({"blur": 0.1}).digest
+    install("effects", "hot_pixels", EXAMPLES["hot_pixels"])
+    assert "hot_pixels" in plugins.names("effects") and affected({"blur": 0.1}).digest == old
+    recipe = affected(HOT)
+    assert recipe.digest != affected(HOT | {"hot_pixels": [0.2, 0.8]}).digest
+    assert pickle.loads(pickle.dumps(recipe)) == recipe
+    assert Recipe.model_validate(yaml.safe_load(recipe.to_yaml())).scene == recipe.scene
+    assert plan(recipe).frames == len(plain)
+    generate(recipe, tmp_path / "out")
+    dataset = Dataset(tmp_path / "out")
+    assert len(dataset) == len(plain)
+    report = check(dataset)
+    assert report.ok, report.findings
+    drawn = [sample.origin.shot.finish(sample.origin.instant).effects for sample in render(recipe)]
+    assert len({each.seed for each in drawn}) == len({each.values["hot_pixels"] for each in drawn}) == len(plain)
+    assert all(0.2 <= each.values["hot_pixels"] <= 0.9 for each in drawn)
+    assert {each.values["hot_pixels_level"] for each in drawn} <= {0.25, 1.0}
+    for sample in dataset:
+        assert np.array_equal(sample.instances, plain[sample.index].instances)
+        assert (sample.rgb != plain[sample.index].rgb).any()
+
+
+def test_an_effect_of_a_name_that_is_not_there_is_refused(install):
+    install("effects", "hot_pixels", EXAMPLES["hot_pixels"])
+    with pytest.raises(RecipeError, match=r"scene\.effects\.hot_pixel: 'hot_pixel' is unknown; did you mean 'hot_pixels'\?"):
+        affected({"hot_pixel": 0.5})
+    with pytest.raises(RecipeError, match=r"effects\.hot_pixels_leve: .*; did you mean 'hot_pixels_level'\?"):
+        affected({"hot_pixels": 0.5, "hot_pixels_leve": 0.5})
+    with pytest.raises(RecipeError, match=r"scene\.effects\.hot_pixels: expected a number less than or equal to 1; found 2"):
+        affected({"hot_pixels": 2})
+
+
+def test_a_shot_with_an_effect_that_is_not_installed_any_more_is_refused(tmp_path):
+    with installed(tmp_path / "site", "effects", "hot_pixels", EXAMPLES["hot_pixels"]):
+        shot = next(iter(plan(affected(HOT)).shots(lambda *_: np.zeros((8, 3)))))
+    with pytest.raises(UserError, match="effect: 'hot_pixels' is unknown"):
+        steps_of(shot.finish(0).effects)
+
+
+TWO = """
+import numpy as np
+from pydantic import Field
+from viewsphere.model.fields.frozen import Frozen
+from viewsphere.model.fields.numbers import Portion, Signed
+from viewsphere.plugins.effect import EffectSpec
+
+class Levels(Frozen):
+    lift: Signed = Field(default=0.0, description="added light")
+    gain: Portion = Field(default=0.0, description="more light")
+
+def apply(picture, options, context):
+    return np.clip(picture * np.float32(1 + options.gain) + np.float32(options.lift), 0, 1)
+
+def effect(name):
+    return EffectSpec(name=name, options=Levels, strongest="more", stage="computer", order=1, apply=apply)
+
+EFFECTS = (effect("lift"), effect("gain"))
+"""
+
+
+def test_several_effects_are_one_file_and_one_step(install):
+    install("effects", "lift gain", TWO)
+    (step,), _ = steps_of(affected({"lift": 0.1, "gain": 0.5}).scene.effects.effects)
+    assert step(np.full((2, 2, 3), 0.2, np.float32), None) == pytest.approx(0.4)
+    assert len(steps_of(affected({"lift": -0.1}).scene.effects.effects)[0]) == 1
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("strongest=", "stronges=", r"EffectSpec\.stronges: 'stronges' is unknown; did you mean 'strongest'\?"),
+        ('stage="sensor"', 'stage="sensr"', r"EffectSpec\.stage: 'sensr' is unknown; did you mean 'sensor'\?"),
+        ("order=50", "order='last'", r"EffectSpec\.order: expected a whole number; found 'last'"),
+        (
+            "options, context)",
+            "options)",
+            r"EffectSpec\.apply: expected a function of 3 values; found apply\(picture, options\)",
+        ),
+        (
+            'name="hot_pixels"',
+            'name="pixels"',
+            r"EffectSpec\.options: expected a class with the fields pixels; found no pixels",
+        ),
+        ("hot_pixels: Portion", "hot_pixels: float", r"EffectSpec\.options: hot_pixels: expected a strength, 0 by default"),
+        ("default=0.0", "default=0.5", r"EffectSpec\.options: hot_pixels: expected a strength, 0 by default"),
+        (
+            'default=1.0, description="their light; 1 is white"',
+            'description="their light"',
+            r"EffectSpec\.options: hot_pixels_level: expected a default and a description; found no default",
+        ),
+        ("hot_pixels_level", "seed", r"EffectSpec\.options: seed: expected another name than draw and seed"),
+    ],
+)
+def test_a_faulty_effect_is_refused_where_it_is_named_and_nowhere_else(install, old, new, message):
+    file = install("effects", "hot_pixels", EXAMPLES["hot_pixels"].replace(old, new))
+    with pytest.raises(PluginError, match=f"^{re.escape(str(file))}: {message}"):
+        affected({"hot_pixels": 0.5})
+    assert plan(affected({"blur": 0.5})).frames
+    assert all(each.error for each in overview() if each.name == "hot_pixels")
+
+
+def test_effects_with_fields_of_one_name_are_refused_together(install):
+    file = install("effects", "hot_pixels", EXAMPLES["hot_pixels"].replace("hot_pixels_level", "focus"))
+    message = "EffectSpec.options: focus: expected a name that no other effect has; found a field of depth_of_field"
+    with pytest.raises(PluginError, match=f"^{re.escape(f'{file}: {message}')}"):
+        affected({"hot_pixels": 0.5})
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("    is_noisy=True,\n", "", "effect hot_pixels: its `apply` reads `context.seed`, which is for noisy effects"),
+        ("return out", "return out[1:]", r"effect hot_pixels: expected its `apply` to return float32 of shape \(.*, 3\)"),
+        ("return out", "return None", r"EffectSpec\.apply: expected a function that returns a ndarray; found NoneType"),
+    ],
+)
+def test_an_effect_that_returns_no_picture_is_refused(install, old, new, message):
+    install("effects", "hot_pixels", EXAMPLES["hot_pixels"].replace(old, new))
+    with pytest.raises(PluginError, match=message):
+        next(iter(render(affected({"hot_pixels": 0.5}))))
 
 
 TETRAHEDRON = "0 0 0 1 0 0 0 0 1\n0 0 0 0 1 0 1 0 0\n0 0 0 0 0 1 0 1 0\n1 0 0 0 1 0 0 0 1\n"

@@ -14,7 +14,6 @@ from viewsphere.model.scene import (
     AreaLight,
     Background,
     Daylight,
-    Effects,
     Environment,
     Finish,
     Ground,
@@ -31,6 +30,7 @@ from viewsphere.model.shot import Shot
 from viewsphere.planning.distances import Distances
 from viewsphere.planning.plan import check_images, plan
 from viewsphere.recipe.recipe import Recipe
+from viewsphere.recipe.world.effects import EffectsEntry
 
 CARS = [{"source": "zoo:car", "count": 3}]
 VIEWS = {"azimuth": {"start": 0, "stop": 360, "step": 45}, "distance": 5}
@@ -75,10 +75,17 @@ def box_of(spec, step=None):
 def test_a_recipe_without_a_word_on_its_scene_has_the_default_one():
     found = planned({})
     shot = found.shot(0, box_of)
-    assert shot.scene == Scene(ground=Ground())
+    assert shot.scene == PLAIN
     assert {f.finish for f in shot.instants} == {None}
     assert shot.things[0].repaints == ()
 
+
+def effects(**values):
+    """The effects of a shot with these strengths and options, the others at 0."""
+    return EffectsEntry.of_defaults().effects.model_copy(update=values)
+
+
+PLAIN = Scene(ground=Ground(), finish=Finish(effects=effects()))
 
 CONCRETE = [
     ({"sun": "off"}, {"sun": None}),
@@ -92,12 +99,15 @@ CONCRETE = [
     ({"ground": "catcher"}, {"ground": Ground(catcher=True)}),
     ({"ground": {"metallic": 1, "tile": 3}}, {"ground": Ground(metallic=1, tile=3)}),
     ({"background": "environment"}, {"ground": Ground(catcher=True)}),
-    ({"background": "transparent"}, {"ground": None, "finish": Finish(background=Background(transparent=True))}),
-    ({"background": "white"}, {"ground": None, "finish": Finish(background=Background(color=(1, 1, 1)))}),
-    ({"smoother": "box"}, {"finish": Finish(smoother=Smoother(kind="box"))}),
-    ({"view": "agx"}, {"finish": Finish(view=ViewTransform(transform="agx"))}),
-    ({"view": {"exposure": -1, "tint": 0.2}}, {"finish": Finish(view=ViewTransform(exposure=-1, tint=0.2))}),
-    ({"effects": {"blur": 0.1, "focus": 4}}, {"finish": Finish(effects=Effects(blur=0.1, focus=4))}),
+    (
+        {"background": "transparent"},
+        {"ground": None, "finish": Finish(background=Background(transparent=True), effects=effects())},
+    ),
+    ({"background": "white"}, {"ground": None, "finish": Finish(background=Background(color=(1, 1, 1)), effects=effects())}),
+    ({"smoother": "box"}, {"finish": Finish(smoother=Smoother(kind="box"), effects=effects())}),
+    ({"view": "agx"}, {"finish": Finish(view=ViewTransform(transform="agx"), effects=effects())}),
+    ({"view": {"exposure": -1, "tint": 0.2}}, {"finish": Finish(view=ViewTransform(exposure=-1, tint=0.2), effects=effects())}),
+    ({"effects": {"blur": 0.1, "focus": 4}}, {"finish": Finish(effects=effects(blur=0.1, focus=4))}),
     (
         {"lights": {"position": [1, 2, 3], "strength": 4, "color": "#ff0000"}},
         {"lights": (PointLight(position=(1, 2, 3), strength=4, color=(1, 0, 0)),)},
@@ -120,7 +130,7 @@ CONCRETE = [
 @pytest.mark.parametrize(("scene", "parts"), CONCRETE)
 def test_every_entry_becomes_a_part_of_the_scene(scene, parts):
     found = scene_of(scene)
-    assert found == Scene(ground=Ground()).model_copy(update=parts)
+    assert found == PLAIN.model_copy(update=parts)
 
 
 @pytest.mark.parametrize(("place", "stops"), [(None, 0), ("zoo:neighbourhood", 0), ("zoo:room", 3.5), ("zoo:table_top", 3.5)])

@@ -12,7 +12,7 @@ from viewsphere.model.annotations.procedural_material import ProceduralMaterial
 from viewsphere.model.fields.frozen import Frozen
 from viewsphere.model.fields.numbers import Length, Portion
 from viewsphere.model.fields.omit_none import OmitNone
-from viewsphere.model.scene import Color, Effects, Picture, Srgb
+from viewsphere.model.scene import Color, Picture, Smoother, Srgb
 from viewsphere.plugins.light import LightSpec
 from viewsphere.recipe.draws import drawn, is_random
 from viewsphere.recipe.entries import Entry, concrete, entry_of, pictures_of, words_of
@@ -42,13 +42,13 @@ class HaloEntry(entry_of(Halo, without=("seed",), fixed=("solid",), optional=("w
     at: str | None = Field(default=None, description="or the name of a place")
 
 
-class MoreEffects(Effects):
-    """Effects with one field more than ours."""
+class MoreSmooth(Smoother):
+    """A smoother with one field more than ours."""
 
     example: Portion = Field(default=0.25, description="what it is for")
 
 
-class MoreEffectsEntry(entry_of(MoreEffects, without=("seed",)), finish.PerFrame):
+class MoreSmoothEntry(entry_of(MoreSmooth), finish.PerFrame):
     """What a recipe would say of it."""
 
 
@@ -61,16 +61,18 @@ def rng_of(path):
 
 
 def test_a_field_that_is_added_to_the_scene_is_one_of_recipes():
-    assert [*MoreEffectsEntry.model_fields] == [*finish.EffectsEntry.model_fields, "example"]
-    told = properties(MoreEffectsEntry)
-    assert told["example"] == {**told["blur"], "default": 0.25, "description": "what it is for", "title": "Example"}
-    assert concrete(drawn(MoreEffectsEntry(), rng_of)) == MoreEffects()
-    made = concrete(drawn(MoreEffectsEntry(example=[0.4, 0.6], blur={"choice": [0.1]}), rng_of))
-    assert (type(made), made.blur) == (MoreEffects, 0.1)
+    assert [*MoreSmoothEntry.model_fields] == [*finish.SmootherEntry.model_fields, "example"]
+    told = properties(MoreSmoothEntry)
+    limits = [{**told["size"]["anyOf"][0], "minimum": 0, "maximum": 1}, *told["size"]["anyOf"][1:]]
+    limits[0].pop("exclusiveMinimum")
+    assert told["example"] == {"anyOf": limits, "default": 0.25, "description": "what it is for", "title": "Example"}
+    assert concrete(drawn(MoreSmoothEntry(), rng_of)) == MoreSmooth()
+    made = concrete(drawn(MoreSmoothEntry(example=[0.4, 0.6], size={"choice": [0.1]}), rng_of))
+    assert (type(made), made.size) == (MoreSmooth, 0.1)
     assert 0.4 <= made.example <= 0.6
     for beyond in (1.5, [0, 1.5], "0.5", {"normal": [1.5, 1]}):
         with pytest.raises(ValidationError):
-            MoreEffectsEntry(example=beyond)
+            MoreSmoothEntry(example=beyond)
 
 
 def test_fields_stand_in_the_scene_s_order_behind_those_of_the_body_but_optional_ones_before():
@@ -188,6 +190,7 @@ def test_all_parts_of_a_scene_have_an_entry():
     assert parts - derived == {
         *(Frozen, OmitNone, ProceduralMaterial),  # what they are made of
         *(scene.Finish, scene.BlendScene, scene.Floor, scene.Scene),
+        scene.Effects,  # whose fields are those of plug-ins
     }
 
 

@@ -4,20 +4,26 @@ from __future__ import annotations
 
 import io
 import math
+from itertools import chain
 
 import numpy as np
 import pytest
+from pydantic import ValidationError
 
+from viewsphere import plugins
 from viewsphere.codecs.srgb import linear
+from viewsphere.errors import UserError
 from viewsphere.model.scene import Background, Effects, Finish, Smoother, ViewTransform
 from viewsphere.model.sensors.camera import Intrinsics
-from viewsphere.rendering.effects import apply_effects, has_effects
-from viewsphere.rendering.effects.blurs import SIGMA, STREAK, streak
+from viewsphere.plugins.effect import EffectSpec
+from viewsphere.rendering.effects import steps_of
+from viewsphere.rendering.effects.blur import SIGMA
+from viewsphere.rendering.effects.chromatic_aberration import SPLIT
 from viewsphere.rendering.effects.color import LUMINANCE, chroma_matrix, tone_table
-from viewsphere.rendering.effects.focus import FAR, circle_radius, disc_area
-from viewsphere.rendering.effects.jpeg import jpeg
-from viewsphere.rendering.effects.lens import DARKEST, SPLIT
+from viewsphere.rendering.effects.depth_of_field import FAR, circle_radius, disc_area
+from viewsphere.rendering.effects.motion_blur import STREAK, streak
 from viewsphere.rendering.effects.noise import ELECTRONS, READ
+from viewsphere.rendering.effects.vignetting import DARKEST
 from viewsphere.rendering.finish import finished
 from viewsphere.rendering.seen import Seen
 from viewsphere.rendering.view import develop, to_bytes
@@ -25,12 +31,19 @@ from viewsphere.rendering.view import develop, to_bytes
 H, W = 96, 160
 LENS = Intrinsics(width=W, height=H, fx=200, fy=200, cx=W / 2, cy=H / 2)
 Y, X = np.mgrid[:H, :W]
-NAMES = [n for n in Effects.model_fields if n not in ("motion_angle_deg", "focus", "seed")]
+SPECS = {name: plugins.load(EffectSpec, name) for name in plugins.shipped("effects")}
 
 
 def seen(inverse_depth=0.2, targets=None, distance=5.0) -> Seen:
     inverse = np.broadcast_to(np.float32(inverse_depth), (H, W)).astype(np.float32)
     return Seen(inverse, np.zeros((H, W), np.bool_) if targets is None else targets, LENS, distance)
+
+
+def apply_effects(picture, effects, known: Seen) -> np.ndarray:
+    """The picture with the effects on light."""
+    for step in steps_of(effects)[0]:
+        picture = step(picture, lambda: known)
+    return picture
 
 
 def noise_picture(channels=3) -> np.ndarray:
@@ -54,13 +67,13 @@ def moments(plane: np.ndarray) -> tuple[float, float, float, float, float]:
 
 
 def test_strength_0_is_the_same_array():
-    picture = noise_picture()
-    assert not has_effects(Effects(seed=3, focus=2.0, motion_angle_deg=45, jpeg=0.5))
-    assert apply_effects(picture, Effects(seed=3), seen()) is picture
+    assert steps_of(Effects()) == steps_of(Effects(seed=3, focus=2.0, motion_angle_deg=45, blur=0.0)) == ([], [])
+    light, coded = steps_of(Effects(jpeg=0.5))
+    assert (len(light), len(coded)) == (0, 1)
 
 
 @pytest.mark.parametrize("channels", [3, 4])
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", SPECS)
 def test_every_effect_changes_something_stays_in_range_and_repeats(name, channels):
     background = Background(transparent=channels == 4)
     finish = Finish(background=background, effects=Effects(**{name: 0.5}))
@@ -72,7 +85,7 @@ def test_every_effect_changes_something_stays_in_range_and_repeats(name, channel
     assert out.shape == (H, W, channels)
     assert not np.array_equal(out, develop(light, None, ViewTransform(), alpha=channels == 4))
     assert np.array_equal(out, finished(light, None, finish, lambda: known))
-    if name != "jpeg":
+    if SPECS[name].stage != "file":
         picture = apply_effects(noise_picture(channels), finish.effects, known)
         assert picture.dtype == np.float32
         assert picture.min() >= -1e-6
@@ -90,6 +103,51 @@ def test_a_plain_finish_asks_for_no_truth():
     assert np.array_equal(finished(light, None, Finish(), unasked), develop(light, None, ViewTransform()))
     with pytest.raises(AssertionError):
         finished(light, None, Finish(smoother=Smoother(kind="box")), unasked)
+
+
+def test_effects_apply_in_the_order_of_the_light_path():
+    """An edge is drawn, blurred, darkened, made noisy and recoloured, whatever the order in which a shot has them."""
+    picture, known = noise_picture(), seen(np.where(X < W / 2, 0.1, 0.4), targets=X > W / 2)
+    path = ["edge_highlight", "depth_of_field", "motion_blur", "blur", "chromatic_aberration", "vignetting"]
+    path += ["shot_noise", "brightness"]
+    together = apply_effects(picture, Effects(**dict.fromkeys(reversed(path), 0.3), seed=5), known)
+    for name in path:
+        picture = apply_effects(picture, Effects(**{name: 0.3}, seed=5), known)
+    assert np.array_equal(together, picture)
+
+
+def test_only_effects_that_read_surfaces_compute_them():
+    def unasked() -> Seen:
+        raise AssertionError
+
+    for name, spec in SPECS.items():
+        (step,) = chain(*steps_of(Effects(**{name: 0.5})))
+        picture = to_bytes(noise_picture()) if spec.stage == "file" else noise_picture()
+        if name in ("edge_highlight", "depth_of_field", "vignetting", "chromatic_aberration"):
+            with pytest.raises(AssertionError):
+                step(picture, unasked)
+        else:
+            assert step(picture, unasked).shape == picture.shape
+
+
+@pytest.mark.parametrize(
+    ("values", "message"),
+    [
+        ({"blur": 1.5}, r"scene\.effects\.blur: expected a number less than or equal to 1; found 1\.5"),
+        ({"blur": "much"}, r"scene\.effects\.blur: expected .*; found 'much'"),
+        ({"depth_of_field": 0.5, "focus": -1}, r"scene\.effects\.focus: expected a number greater than 0; found -1"),
+        ({"blurr": 0.5}, "effect: 'blurr' is unknown; did you mean 'blur'"),
+    ],
+)
+def test_effects_of_a_stored_shot_that_are_not_valid_are_refused(values, message):
+    with pytest.raises(UserError, match=message):
+        steps_of(Effects(**values))
+
+
+@pytest.mark.parametrize("seed", [-1, 0.5, "1", True])
+def test_the_seed_of_a_stored_shot_is_a_whole_number(seed):
+    with pytest.raises(ValidationError, match="expected a whole number as seed, 0 or more; found"):
+        Effects(seed=seed)
 
 
 @pytest.mark.parametrize(
@@ -171,7 +229,7 @@ def test_what_is_in_front_of_the_focus_has_a_soft_border_over_what_is_sharp():
 
 
 def test_large_discs_may_be_visited_sparsely(monkeypatch):
-    from viewsphere.rendering.effects import focus
+    from viewsphere.rendering.effects import depth_of_field as focus
 
     picture = np.random.default_rng(9).random((H, W, 3), np.float32)
     known = seen(np.where((X - 80) ** 2 + (Y - 48) ** 2 < 900, 0.2, 0.02))
@@ -261,6 +319,12 @@ def test_lines_lie_on_borders_and_creases_of_targets_only():
     assert out[48, 31] > 0.8
     assert np.allclose(out[48, 45:65], 0.3, atol=1e-3)
     assert np.allclose(out[:10], 0.3)
+
+
+def jpeg(pixels, strength):
+    for step in steps_of(Effects(jpeg=strength))[1]:
+        pixels = step(pixels, seen)
+    return pixels
 
 
 def test_jpeg_is_jpeg():

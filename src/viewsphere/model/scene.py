@@ -5,18 +5,23 @@ Light has one unit: a white Lambert surface that receives an irradiance of pi ha
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal
+from collections.abc import Mapping
+from typing import Annotated, Any, Literal, cast
 
-from pydantic import BeforeValidator, Field
+from pydantic import BeforeValidator, ConfigDict, Field, JsonValue, model_validator
 
 from viewsphere.model.annotations.procedural_material import ProceduralMaterial
 from viewsphere.model.fields.frozen import Frozen
 from viewsphere.model.fields.numbers import Amount, Length, Metres, Number, Portion, Signed, Strength
 from viewsphere.model.fields.omit_none import OmitNone
 from viewsphere.model.weather import Fog, Lamps, Rain, Snow, Wet
+from viewsphere.validation.errors import shown
 
 WEATHER = ("fog", "rain", "snow", "wet", "lamps")
 """Fields of a scene that describe its weather and its lit lamps."""
+
+SEED = "seed"
+"""The name of the noise's seed among the strengths and options of effects."""
 
 Vector = tuple[float, float, float]
 Row = tuple[float, float, float, float]
@@ -216,24 +221,29 @@ class Smoother(Frozen):
 
 
 class Effects(Frozen):
-    """The camera's effects on its picture; strengths are 0 (no effect) to 1 (the largest sensible one). Labels never change."""
+    """The camera's effects on its picture: the strengths and options of plug-ins (`viewsphere.plugins.effect`) by their names,
+    and the `seed` of their noise. A strength of 0, or none, is no effect. Labels never change.
+    """
 
-    blur: Portion = Field(default=0.0, description="defocus, as a Gaussian")
-    motion_blur: Portion = Field(default=0.0, description="blur from camera motion")
-    motion_angle_deg: Number = Field(default=0.0, description="direction of the motion blur: counter-clockwise from the right")
-    depth_of_field: Portion = Field(default=0.0, description="blur of surfaces nearer or farther than focus")
-    focus: Length | None = Field(default=None, description="metres; default: the distance of the camera's target")
-    vignetting: Portion = Field(default=0.0, description="darker corners")
-    chromatic_aberration: Portion = Field(default=0.0, description="coloured edges towards the corners")
-    brightness: Signed = Field(default=0.0, description="-1 to 1")
-    contrast: Signed = Field(default=0.0, description="-1 to 1")
-    saturation: Signed = Field(default=0.0, description="-1 (grey) to 1")
-    hue: Signed = Field(default=0.0, description="-1 to 1: 1 turns colours half way round")
-    edge_highlight: Portion = Field(default=0.0, description="brighter edges")
-    shot_noise: Portion = Field(default=0.0, description="shot noise, stronger in bright parts")
-    read_noise: Portion = Field(default=0.0, description="sensor noise, equal everywhere")
-    jpeg: Portion = Field(default=0.0, description="traces of compression")
-    seed: int = Field(default=0, ge=0, description="seed of the noise")
+    model_config = ConfigDict(extra="allow")
+    __pydantic_extra__: dict[str, JsonValue] = Field(init=False)  # pyright: ignore[reportIncompatibleVariableOverride]
+
+    @model_validator(mode="after")
+    def _check_seed(self) -> Effects:
+        seed = self.values.get(SEED, 0)
+        if type(seed) is not int or seed < 0:
+            raise ValueError(f"expected a whole number as {SEED}, 0 or more; found {shown(seed)}")
+        return self
+
+    @property
+    def values(self) -> Mapping[str, JsonValue]:
+        """The strengths, options and seed by name, in the order in which they are stored."""
+        return self.__pydantic_extra__
+
+    @property
+    def seed(self) -> int:
+        """The seed of the noise."""
+        return cast(int, self.values.get(SEED, 0))
 
 
 class Finish(Frozen):

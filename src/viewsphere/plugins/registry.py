@@ -5,9 +5,9 @@ listing names imports no plug-in. Other packages name their modules in entry poi
 on, or a package with a module a plug-in in the group `viewsphere.packages`: `families = "my_package.families"`. A plug-in of
 theirs that cannot be loaded is an error only if a recipe names it.
 
-A module of labels may hold several, as `LABELS = (ChannelLabel(name="flow", ...), ...)`. Listing reads their names in the text
-of that statement, without importing the module. Loading compares them with the labels. Third parties write one entry point for
-each label; several may name the same module.
+A module of labels or effects may hold several, as `LABELS = (ChannelLabel(name="flow", ...), ...)`. Listing reads their names
+in the text of that statement, without importing the module. Loading compares them with the specs. Third parties write one
+entry point for each; several may name the same module.
 """
 
 from __future__ import annotations
@@ -28,6 +28,7 @@ from viewsphere.errors import PluginError, UserError
 from viewsphere.plugin_modules import PACKAGES, Changes, changes, entry_points, of_group
 
 Kind = Literal[
+    "effects",
     "engines",
     "families",
     "formats",
@@ -66,6 +67,7 @@ class Seam(NamedTuple):
 
 
 SEAMS: dict[Kind, Seam] = {
+    "effects": Seam("viewsphere.rendering.effects", "EFFECT", "EFFECTS"),
     "engines": Seam("viewsphere.engines", "ENGINE"),
     "families": Seam("", "FAMILY"),
     "formats": Seam("viewsphere.formats", "FORMAT"),

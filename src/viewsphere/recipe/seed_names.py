@@ -8,15 +8,14 @@ from `_UNCHANGED` to `_RENAMED`, with the old name on the right.
 from __future__ import annotations
 
 _UNCHANGED = """
-    amount angle_deg aside at background bay begin below blend blur brightness chromatic_aberration clouds color company
-    contrast count date daylight density depth_of_field distance distractors drop edge_highlight effects enter exposure
-    fit flip focal_mm focal_px focus fog fov_deg friction glow ground hdri height high highest_hz horizon hue image jitter
-    jpeg kerb keys kind lamps lane latitude leave length lights longitude mass material materials metallic moon most
-    motion motion_angle_deg motion_blur night normal_image objects off_center offset parked pattern pavement period
-    phase_deg place planes points position principal_point puddles radius rain rate reach read_noise restitution
-    rotation_deg roughness roughness_image saturation scale shot_noise side size sky smoother snow speed spin_deg spread
-    strength sun target temperature_k texture tile time tint toward transform turbidity turn velocity view vignetting
-    visibility walkers wet wind windows zenith zoom
+    amount angle_deg aside at background bay begin below blend blur clouds color company count date daylight density
+    distance distractors drop effects enter exposure fit flip focal_mm focal_px fog fov_deg friction glow ground hdri
+    height high highest_hz horizon image jitter kerb keys kind lamps lane latitude leave length lights longitude mass
+    material materials metallic moon most motion night normal_image objects off_center offset parked pattern pavement
+    period phase_deg place planes points position principal_point puddles radius rain rate reach restitution
+    rotation_deg roughness roughness_image scale side size sky smoother snow speed spin_deg spread strength sun target
+    temperature_k texture tile time tint toward transform turbidity turn velocity view visibility walkers wet wind
+    windows zenith zoom
 """
 """Fields whose names equal their seed names."""
 
@@ -27,5 +26,5 @@ SEED_NAMES = {**{name: name for name in _UNCHANGED.split()}, **_RENAMED}
 
 
 def seed_name(field: str) -> str:
-    """The name that seeds the draws of a field. A third-party plug-in's field is seeded by its own name."""
+    """The name that seeds the draws of a field. Fields of effects and of third-party plug-ins are seeded by their own names."""
     return SEED_NAMES.get(field, field)

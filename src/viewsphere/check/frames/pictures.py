@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from viewsphere.model.channel import ALL_PICTURES
 from viewsphere.model.sample import Sample
 from viewsphere.rendering.background import shows_sky
+from viewsphere.rendering.effects import steps_of
 from viewsphere.rendering.finish import is_plain
 from viewsphere.rendering.view import bytes_of_words, picture_of_light
 
@@ -28,18 +29,19 @@ LOSSLESS = (".png", ".qoi")
 def pictures(sample: Sample) -> Iterator[str]:
     """Yield each pair of a frame's pictures that differ by more than their precision.
 
-    JPEG's traces are in `rgb` alone, smoother and effects in no light, and a background picture is no light either: such pairs
+    Effects on bytes are in `rgb` alone, smoother and effects in no light, and a background picture is no light either: such pairs
     are not compared.
     """
     finish = sample.finish
     if finish is None or sum(name in sample.channels for name in ALL_PICTURES) < 2:
         return
+    is_exact = sample.files.get("rgb", "").endswith(LOSSLESS) and not steps_of(finish.effects)[1]
     words = bytes_of_words(sample.channels["rgb16"]) if "rgb16" in sample.channels else None
-    if words is not None and sample.files.get("rgb", "").endswith(LOSSLESS) and not finish.effects.jpeg:
+    if words is not None and is_exact:
         yield from _outside("rgb", sample.channels["rgb"], "rgb16", words, words)
     if "rgb_linear" in sample.channels and is_plain(finish) and shows_sky(finish.background):
         seen = words
-        if seen is None and sample.files.get("rgb", "").endswith(LOSSLESS) and not finish.effects.jpeg:
+        if seen is None and is_exact:
             seen = sample.channels["rgb"]
         if seen is not None:
             yield from _outside("rgb16" if words is not None else "rgb", seen, "rgb_linear", *_shown(sample))

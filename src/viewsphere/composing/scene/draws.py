@@ -25,6 +25,7 @@ from viewsphere.model.fields.frozen import Frozen
 from viewsphere.model.instant import Viewpoint
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.scene import (
+    SEED,
     WHITE,
     AnyLight,
     AnySky,
@@ -43,6 +44,7 @@ from viewsphere.recipe.entries import concrete, pictures_of
 from viewsphere.recipe.lights import Lamp, spec_of
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.recipe.seed_names import seed_name
+from viewsphere.recipe.world.effects import EffectsEntry
 from viewsphere.recipe.world.finish import BackgroundEntry, JitterEntry, PerFrame, ViewEntry
 from viewsphere.recipe.world.light import DaylightSky, HdriSky, NightEntry, NightSky, SunEntry
 from viewsphere.recipe.world.surface import GroundEntry, MaterialEntry
@@ -183,7 +185,7 @@ class Scenes:
                 sky=sky.model_copy(update={"strength": 0.0}) if isinstance(sky, Daylight) and is_night(sun) else sky,
                 lights=_lights(entry.lights, rng_of),
                 ground=self._ground(drawn(entry.ground, rng_of, ("ground",)), rng_of),
-                finish=self._finish(names_of_finish, ()) if names_of_finish else Finish(),
+                finish=self._finish(names_of_finish, ()) if names_of_finish else _plain_finish(),
             )
             outdoors = weathered(drawn_scene, entry, rng_of, partial(self._weather_seed, names))
             return through_windows(drawn_scene, outdoors) if self._is_indoors else outdoors
@@ -227,7 +229,7 @@ class Scenes:
         if self.recipe.scene.effects.is_noisy:
             of = (*frame, self.variation) if self.variation else frame
             seed = int(share(self.recipe.seed, "noise", *of) * 2**32)
-            parts["effects"] = parts["effects"].model_copy(update={"seed": seed})
+            parts["effects"] = parts["effects"].model_copy(update={SEED: seed})
         return Finish(**parts)
 
     @cached_property
@@ -239,6 +241,8 @@ class Scenes:
             entry = drawn(getattr(self.recipe.scene, field), self._rng_of(names), (seed_name(field),))
             if isinstance(entry, BackgroundEntry):
                 return self._background(entry, names)
+            if isinstance(entry, EffectsEntry):
+                return entry.effects
             if isinstance(entry, ViewEntry) and entry.exposure == "auto":
                 return concrete(entry, exposure=INDOOR_STOPS if self._is_indoors else 0.0)
             return concrete(entry)
@@ -252,6 +256,11 @@ class Scenes:
         elif entry.image is not None:
             image = self.pictures["image", entry.image][0]
         return concrete(entry, image=image)
+
+
+def _plain_finish() -> Finish:
+    """The finish of a shot whose frames all have their own."""
+    return Finish(effects=EffectsEntry.of_defaults().effects)
 
 
 def _substance(name: Any, size: int, rng_of: RngOf, field: tuple[str, ...]) -> ProceduralMaterial:

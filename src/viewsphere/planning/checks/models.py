@@ -262,12 +262,14 @@ def check_photo(recipe: Recipe) -> None:
 
 def check_shutter(recipe: Recipe) -> None:
     """Refuse a recipe that blurs moving things twice: by an open shutter, and by an effect."""
-    blurs = alternatives(recipe.scene.effects.motion_blur)
-    if recipe.time is not None and recipe.time.shutter and any(span(blur)[1] > 0 for blur in blurs):
-        raise RecipeError(
-            "time.shutter: expected 0 beside scene.effects.motion_blur, which blurs pictures, too; found "
-            f"{recipe.time.shutter:g}: leave one of them out"
-        )
+    if recipe.time is None or not recipe.time.shutter:
+        return
+    for spec, strength in recipe.scene.effects.strengths:
+        if spec.shows_motion and any(span(blur)[1] > 0 for blur in alternatives(strength)):
+            raise RecipeError(
+                f"time.shutter: expected 0 beside scene.effects.{spec.name}, which blurs pictures, too; found "
+                f"{recipe.time.shutter:g}: leave one of them out"
+            )
 
 
 def check_splits(recipe: Recipe) -> None:

@@ -1,4 +1,4 @@
-"""The entries that turn light into a picture: background, smoother, view, effects; and the camera's jitter."""
+"""The entries that turn light into a picture: background, smoother and view; and the camera's jitter."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ from typing import Annotated, Any, Literal, TypeVar
 from pydantic import BeforeValidator, Discriminator, Field, Tag, model_validator
 
 from viewsphere.model.fields.frozen import Frozen
-from viewsphere.model.scene import Background, Effects, Picture, Smoother, ViewTransform
-from viewsphere.recipe.draws import Coordinate, Distribution, Drawn, PointDrawn, is_random
+from viewsphere.model.scene import Background, Picture, Smoother, ViewTransform
+from viewsphere.recipe.draws import Coordinate, Drawn, PointDrawn, is_random
 from viewsphere.recipe.entries import entry_of, is_drawn_color, words_of
 from viewsphere.recipe.values import COLOR_FORMS, OrShort, parse_color
 from viewsphere.recipe.world.scenery import Draw
@@ -99,15 +99,6 @@ class ViewEntry(entry_of(ViewTransform), PerFrame):
     exposure: Stops = Field(  # pyright: ignore[reportIncompatibleVariableOverride]
         default="auto", description="stops: 1 is twice as bright; auto: 0, or in rooms a daylight exposure"
     )
-
-
-class EffectsEntry(entry_of(Effects, without=("seed",)), PerFrame):
-    """Camera effects; strengths are 0 (none) to 1 (the strongest useful effect)."""
-
-    @property
-    def is_noisy(self) -> bool:
-        """True if the effects can include noise, which differs in every frame."""
-        return any(isinstance(value, Distribution) or value > 0 for value in (self.shot_noise, self.read_noise))
 
 
 class JitterEntry(PerFrame):

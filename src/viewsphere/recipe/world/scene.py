@@ -31,10 +31,10 @@ from viewsphere.recipe.draws import Drawn, alternatives, is_random
 from viewsphere.recipe.lights import LightsField, spec_of
 from viewsphere.recipe.values import OrShort, pair
 from viewsphere.recipe.world.blend import BlendField, VariantEntry
+from viewsphere.recipe.world.effects import EffectsEntry
 from viewsphere.recipe.world.finish import (
     BackgroundEntry,
     BackgroundField,
-    EffectsEntry,
     JitterEntry,
     PerFrame,
     SmootherEntry,

@@ -1,60 +1,108 @@
-"""The effects of a camera on its picture; labels never change.
+"""The effects of a camera on its picture: one file an effect, or several that one function computes; labels never change.
 
-Effects apply in the order of the light path: lines on the objects, lens, sensor, the camera's computer. Pictures are
-display-linear in [0, 1], (H, W, 3), or (H, W, 4) premultiplied, where blurs spread alpha too, while noise and colours leave
-alpha alone. Strength 0 changes no byte; with W the picture's width, strength 1 means:
-
-| effect | at strength 1 |
-| --- | --- |
-| `edge_highlight` | white lines, W / 300 wide, along the targets' borders and creases |
-| `depth_of_field` | points infinitely far away blur to discs of diameter W / 20, near ones at most to twice that |
-| `motion_blur` | a straight streak of length W / 12 |
-| `blur` | a Gaussian of sigma W / 50 |
-| `chromatic_aberration` | red 1 % larger and blue 1 % smaller than green, about the principal point |
-| `vignetting` | the farthest corner has a tenth of its light: cos^4 of an angle whose tangent grows with the radius |
-| `shot_noise` | white is 50 photo-electrons: Poisson noise of 14 % of white, elsewhere in proportion to the square root |
-| `read_noise` | Gaussian noise of 3 % of white everywhere |
-| `brightness` | at 1 twice the light, at -1 half of it |
-| `contrast` | at 1 coded values twice as far from the middle, at -1 half as far |
-| `saturation` | at 1 twice as far from grey, at -1 grey |
-| `hue` | at 1 or -1 half a turn about grey, luminance kept |
-| `jpeg` | quality 5 (95 just above strength 0), colours at half the resolution; applied last, to bytes |
-
-Between 0 and 1, effects scale in proportion to strength. Shot noise scales its electrons with 1 / strength^2, so that its noise
-is proportional, too.
+A file holds `EFFECT = EffectSpec(...)`, or several in `EFFECTS`. Effects apply in the order of the light path: lines on the
+objects, lens, sensor, the camera's computer, and the file's compression. Pictures are display-linear in [0, 1], (H, W, 3), or
+(H, W, 4) premultiplied, where blurs spread alpha too, while noise and colours leave alpha alone. Strength 0 changes no byte.
+Between 0 and 1, effects scale in proportion to strength.
 """
 
 from __future__ import annotations
 
+import sys
+from collections.abc import Callable, Iterable
+from functools import lru_cache, partial
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
-from viewsphere.model.scene import Effects
-from viewsphere.rendering.effects.blurs import blur, motion_blur
-from viewsphere.rendering.effects.color import jitter
-from viewsphere.rendering.effects.edges import edge_highlight
-from viewsphere.rendering.effects.focus import depth_of_field
-from viewsphere.rendering.effects.lens import chromatic_aberration, vignetting
-from viewsphere.rendering.effects.noise import noise
+from viewsphere import plugins
+from viewsphere.errors import PluginError
+from viewsphere.model.fields.frozen import Frozen
+from viewsphere.model.scene import SEED, Effects
+from viewsphere.plugin_modules import Changes, changes
+from viewsphere.plugins.effect import EffectSpec
 from viewsphere.rendering.seen import Seen
+from viewsphere.validation.errors import read_options
 
-_SETTINGS = ("jpeg", "seed", "motion_angle_deg", "focus")
-"""Fields of `Effects` that change no display-linear picture by themselves."""
-
-
-def has_effects(effects: Effects) -> bool:
-    """Return whether `apply_effects` would change anything."""
-    return any(getattr(effects, name) for name in Effects.model_fields if name not in _SETTINGS)
+Picture = NDArray[Any]
+Step = Callable[[Picture, Callable[[], Seen]], Picture]
+"""One effect, or several in one: the changed picture, from a picture and a function that returns the surfaces in it."""
 
 
-def apply_effects(picture: NDArray[np.float32], effects: Effects, seen: Seen) -> NDArray[np.float32]:
-    """The picture with all effects but JPEG, which works on bytes; the same array if there are no effects."""
-    e = effects
-    picture = edge_highlight(picture, e.edge_highlight, seen)
-    picture = depth_of_field(picture, e.depth_of_field, e.focus or seen.distance, seen.inverse_depth)
-    picture = motion_blur(picture, e.motion_blur, e.motion_angle_deg)
-    picture = blur(picture, e.blur)
-    picture = chromatic_aberration(picture, e.chromatic_aberration, seen.intrinsics)
-    picture = vignetting(picture, e.vignetting, seen.intrinsics)
-    picture = noise(picture, e.shot_noise, e.read_noise, e.seed)
-    return jitter(picture, e.brightness, e.contrast, e.saturation, e.hue)
+class EffectContext:
+    """The frame that an effect changes.
+
+    Args:
+        name: The effect's name.
+        seen: Returns the surfaces in the picture. It is called only if the effect reads them.
+        seed: The seed of noise; None for an effect without.
+    """
+
+    def __init__(self, name: str, seen: Callable[[], Seen], seed: int | None) -> None:
+        self._name, self._seen, self._seed = name, seen, seed
+
+    @property
+    def seen(self) -> Seen:
+        """The depth and the targets of each pixel, the lens, and the distance of the camera's target."""
+        return self._seen()
+
+    @property
+    def seed(self) -> int:
+        """The seed of the frame's noise, which all noisy effects share: make a generator of it and of the effect's name."""
+        if self._seed is None:
+            raise PluginError(
+                f"effect {self._name}: its `apply` reads `context.seed`, which is for noisy effects: set `is_noisy` to True"
+            )
+        return self._seed
+
+
+def steps_of(effects: Effects) -> tuple[list[Step], list[Step]]:
+    """The effects that are on, in the order of the light path: those of display-linear light, and those of coded bytes.
+
+    Raises UserError for effects of unknown names, and for strengths and options that are not valid.
+    """
+    values = effects.values
+    asked = [name for name, value in values.items() if value and name != SEED]
+    installed = changes(sys.path) if asked else ()
+    named = {name: _spec(name, installed) for name in asked}
+    found = sorted((spec for spec in named.values() if spec is not None), key=lambda spec: spec.place)
+    fields = {field for spec in found for field in spec.options.model_fields}
+    _check_options(name for name, spec in named.items() if spec is None and name not in fields)
+    first = dict[Any, EffectSpec]()
+    for spec in found:
+        first.setdefault((spec.apply, spec.options), spec)
+    on_light, on_bytes = list[Step](), list[Step]()
+    for spec in first.values():
+        options = read_options(spec.options, {k: values[k] for k in spec.options.model_fields if k in values}, "scene.effects")
+        step = partial(_apply, spec, options, effects.seed if spec.is_noisy else None)
+        (on_bytes if spec.stage == "file" else on_light).append(step)
+    return on_light, on_bytes
+
+
+@lru_cache(maxsize=64)
+def _spec(name: str, _installed: Changes) -> EffectSpec | None:
+    """The effect of a name, None for an option. Frames ask for the same few: loading one takes a tenth of a millisecond."""
+    return plugins.load(EffectSpec, name) if name in plugins.names("effects") else None
+
+
+def _check_options(names: Iterable[str]) -> None:
+    """Raise UserError for a name that is no option of an effect: its plug-in may not be installed any more."""
+    for name in names:
+        if not any(name in spec.options.model_fields for spec in plugins.loadable(EffectSpec).values()):
+            plugins.load(EffectSpec, name)
+
+
+def _apply(spec: EffectSpec, options: Frozen, seed: int | None, picture: Picture, seen: Callable[[], Seen]) -> Picture:
+    """The picture with an effect; raises PluginError if that is not a picture of the same kind."""
+    changed = spec.apply(picture, options, EffectContext(spec.name, seen, seed))
+    changed = plugins.checked(EffectSpec, spec.name, "apply", changed, np.ndarray)
+    if changed.shape != picture.shape or changed.dtype != picture.dtype:
+        raise PluginError(
+            f"effect {spec.name}: expected its `apply` to return {_kind(picture)}, as it was given; found {_kind(changed)}"
+        )
+    return changed
+
+
+def _kind(picture: Picture) -> str:
+    return f"{picture.dtype} of shape {picture.shape}"

@@ -7,8 +7,13 @@ from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import Field
 
 from viewsphere.codecs.srgb import linear
+from viewsphere.model.fields.frozen import Frozen
+from viewsphere.model.fields.numbers import Signed
+from viewsphere.plugins.effect import EffectSpec
+from viewsphere.rendering.effects import EffectContext
 
 Float32 = NDArray[np.float32]
 
@@ -16,20 +21,28 @@ LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 """Shares of linear sRGB's red, green and blue in the luminance."""
 
 
-def jitter(picture: Float32, brightness: float, contrast: float, saturation: float, hue: float) -> Float32:
+class _Color(Frozen):
+    """The strengths, which one pass over the pixels applies."""
+
+    brightness: Signed = Field(default=0.0, description="-1 to 1")
+    contrast: Signed = Field(default=0.0, description="-1 to 1")
+    saturation: Signed = Field(default=0.0, description="-1 (grey) to 1")
+    hue: Signed = Field(default=0.0, description="-1 to 1: 1 turns colours half way round")
+
+
+def _apply(picture: Float32, options: _Color, _context: EffectContext) -> Float32:
     """The picture with its colours changed, clipped to [0, 1]; alpha is unchanged, and grey stays grey.
 
     Light is multiplied by 2^brightness; then coded values move from 1/2 by 2^contrast; then the linear colour rotates by `hue`
     half turns about the grey axis, and its distance from grey is multiplied by 1 + saturation. Both keep the luminance.
     """
-    if brightness == contrast == saturation == hue == 0:
-        return picture
-    from viewsphere.rendering.effects import kernels_color as kernels
+    from viewsphere.rendering.effects.shared import kernels_color as kernels
 
     out = np.empty_like(picture)
     channels = picture.shape[2]
-    table = tone_table(brightness, contrast) if brightness or contrast else np.zeros(0, np.float32)
-    matrix = chroma_matrix(saturation, hue).astype(np.float32)
+    is_toned = options.brightness or options.contrast
+    table = tone_table(options.brightness, options.contrast) if is_toned else np.zeros(0, np.float32)
+    matrix = chroma_matrix(options.saturation, options.hue).astype(np.float32)
     kernels.recolor(picture.reshape(-1, channels), table, matrix, out.reshape(-1, channels))
     return out
 
@@ -64,3 +77,18 @@ def _curve() -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Coded values and their light at the same nodes, which are denser in the dark range."""
     codes = np.arange(4097) / 4096
     return codes, linear(codes)
+
+
+def _effect(name: str, order: int, record: int, strongest: str) -> EffectSpec:
+    """One of the effects, which share their options and their function."""
+    return EffectSpec(
+        name=name, options=_Color, strongest=strongest, stage="computer", order=order, apply=_apply, record=record
+    )
+
+
+EFFECTS = (
+    _effect("brightness", 10, 6, "at 1 twice the light, at -1 half of it"),
+    _effect("contrast", 20, 7, "at 1 coded values twice as far from the middle, at -1 half as far"),
+    _effect("saturation", 30, 8, "at 1 twice as far from grey, at -1 grey"),
+    _effect("hue", 40, 9, "at 1 or -1 half a turn about grey, luminance kept"),
+)

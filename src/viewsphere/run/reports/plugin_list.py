@@ -9,6 +9,7 @@ from importlib.metadata import version
 from viewsphere.errors import UserError
 from viewsphere.labels import LabelSpec
 from viewsphere.plugin_modules import PACKAGES
+from viewsphere.plugins.effect import EffectSpec
 from viewsphere.plugins.engine import EngineSpec
 from viewsphere.plugins.family import ZooFamily
 from viewsphere.plugins.format import FormatSpec
@@ -27,6 +28,7 @@ from viewsphere.plugins.trajectory import TrajectorySpec
 from viewsphere.validation.errors import one_of
 
 SPECS: tuple[type[Spec | LensSpec], ...] = (
+    EffectSpec,
     EngineSpec,
     FormatSpec,
     LabelSpec,

@@ -24,7 +24,7 @@ from viewsphere.model.scene import Finish
 from viewsphere.model.sensors.camera import Camera
 from viewsphere.model.shot import Shot
 from viewsphere.rendering.background import display_background
-from viewsphere.rendering.effects import has_effects
+from viewsphere.rendering.effects import steps_of
 from viewsphere.rendering.view import EXPOSURE
 from viewsphere.rendering.white import NEUTRAL_K
 
@@ -162,7 +162,7 @@ def _lacking(samples: Sequence[Sample], finishes: Sequence[Finish], off: float) 
         yield f"the camera is off by up to {off:.1g} of its distance: Blender's numbers are single, the origin far"
     if any(not sample.camera.lens.is_linear or sample.camera.intrinsics.skew for sample in samples):
         yield "Blender's camera has no such distortion or skew: a pinhole of the same focal lengths and centre takes its place"
-    if any(has_effects(f.effects) or f.smoother.kind != "none" or f.effects.jpeg for f in finishes):
+    if any(any(steps_of(f.effects)) or f.smoother.kind != "none" for f in finishes):
         yield "scene.effects and scene.smoother are not in the file: viewsphere does them to the finished picture"
     views = [finish.view.model_copy(update={"exposure": 0.0}) for finish in finishes]
     if any(view != views[0] or view.tint for view in views):

@@ -6,7 +6,12 @@ import math
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import Field
 
+from viewsphere.model.fields.frozen import Frozen
+from viewsphere.model.fields.numbers import Length, Portion
+from viewsphere.plugins.effect import EffectSpec
+from viewsphere.rendering.effects import EffectContext
 from viewsphere.rendering.spread import box, spread_both_ways
 
 Float32 = NDArray[np.float32]
@@ -27,20 +32,27 @@ STEP = 1.0
 """Largest difference, in pixels, between the disc radii of neighbouring pixels of one surface."""
 
 
-def depth_of_field(picture: Float32, strength: float, focus: float, inverse_depth: Float32) -> Float32:
-    """The picture through a thin lens whose sharp plane is `focus` metres away; inverse depth (H, W), 0 is infinitely far.
+class _DepthOfField(Frozen):
+    """The strength, and the distance of the sharp plane."""
+
+    depth_of_field: Portion = Field(default=0.0, description="blur of surfaces nearer or farther than focus")
+    focus: Length | None = Field(default=None, description="metres; default: the distance of the camera's target")
+
+
+def _apply(picture: Float32, options: _DepthOfField, context: EffectContext) -> Float32:
+    """The picture through a thin lens whose sharp plane is `focus` metres away.
 
     Every pixel is spread over its disc. A pixel behind a sharp or less blurred pixel does not spread over that pixel. A pixel
     in front of the focus spreads over everything, and the background behind its soft border is filled in from the
     neighbourhood. Pixels at a depth step show both sides: before the spreading, they get the colour of their own side;
     afterwards, they are softened over three pixels.
     """
-    largest = strength * FAR * picture.shape[1]
+    largest = options.depth_of_field * FAR * picture.shape[1]
     if largest < 1e-3:
         return picture
-    from viewsphere.rendering.effects import kernels_focus as kernels
+    from viewsphere.rendering.effects.shared import kernels_focus as kernels
 
-    signed = circle_radius(inverse_depth, focus, largest)
+    signed = circle_radius(context.seen.inverse_depth, options.focus or context.seen.distance, largest)
     step = _steps(signed)
     picture = _one_sided(picture, signed, step)
     stride = max(1, math.ceil(float(np.abs(signed).max()) / TAPS))
@@ -59,7 +71,8 @@ def depth_of_field(picture: Float32, strength: float, focus: float, inverse_dept
 
 
 def circle_radius(inverse_depth: Float32, focus: float, largest: float) -> Float32:
-    """Radius in pixels of the circle of confusion, above 0 in front of the focus, below 0 behind it; float32.
+    """Radius in pixels of the circle of confusion, above 0 in front of the focus, below 0 behind it; float32. Inverse depth is
+    (H, W), 0 infinitely far.
 
     A thin lens of aperture A, its sensor v pixels behind it, shows a point at z as a disc of diameter A v |1/z - 1/focus|,
     which is proportional to |focus / z - 1|: `largest` is the radius at infinity.
@@ -113,3 +126,14 @@ def _one_sided(picture: Float32, signed: Float32, step: Mask) -> Float32:
     out = picture.copy()
     out[y[is_covered], x[is_covered]] = colors[is_covered] / total[is_covered, None]
     return out
+
+
+EFFECT = EffectSpec(
+    name="depth_of_field",
+    options=_DepthOfField,
+    strongest="points infinitely far away blur to discs of diameter W / 20, near ones at most to twice that",
+    stage="lens",
+    order=10,
+    apply=_apply,
+    record=3,
+)

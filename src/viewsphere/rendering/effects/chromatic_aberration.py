@@ -1,30 +1,37 @@
-"""Lens effects away from the axis: chromatic aberration and vignetting."""
+"""Chromatic aberration: a lens enlarges each colour differently."""
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import Field
 
+from viewsphere.model.fields.frozen import Frozen
+from viewsphere.model.fields.numbers import Portion
 from viewsphere.model.sensors.camera import Intrinsics
+from viewsphere.plugins.effect import EffectSpec
+from viewsphere.rendering.effects import EffectContext
 
 Float32 = NDArray[np.float32]
 
 SPLIT = 0.01
 """Enlargement of red at strength 1, and reduction of blue."""
 
-DARKEST = 0.1
-"""Share of its light that the farthest corner keeps at strength 1."""
+
+class _ChromaticAberration(Frozen):
+    """The strength."""
+
+    chromatic_aberration: Portion = Field(default=0.0, description="coloured edges towards the corners")
 
 
-def chromatic_aberration(picture: Float32, strength: float, intrinsics: Intrinsics) -> Float32:
+def _apply(picture: Float32, options: _ChromaticAberration, context: EffectContext) -> Float32:
     """The picture with red and blue scaled about the principal point in opposite directions; alpha covers all three
     channels.
     """
-    if strength == 0:
-        return picture
+    intrinsics = context.seen.intrinsics
     out = picture.copy()
     for channel, sign in ((0, 1), (2, -1)):
-        scale = 1 + sign * SPLIT * strength
+        scale = 1 + sign * SPLIT * options.chromatic_aberration
         out[..., channel] = _scaled(picture[..., channel], scale, intrinsics)
         if picture.shape[2] == 4:
             np.maximum(out[..., 3], _scaled(picture[..., 3], scale, intrinsics), out=out[..., 3])
@@ -44,18 +51,12 @@ def _scaled(plane: Float32, scale: float, intrinsics: Intrinsics) -> Float32:
     return plane
 
 
-def vignetting(picture: Float32, strength: float, intrinsics: Intrinsics) -> Float32:
-    """The picture with a falloff of cos^4 of the angle to the axis, scaled to the farthest corner's share; alpha is
-    unchanged.
-    """
-    if strength == 0:
-        return picture
-    height, width = picture.shape[:2]
-    x = (np.arange(width, dtype=np.float32) + np.float32(0.5 - intrinsics.cx)) ** 2
-    y = (np.arange(height, dtype=np.float32) + np.float32(0.5 - intrinsics.cy)) ** 2
-    corner = max(intrinsics.cx, width - intrinsics.cx) ** 2 + max(intrinsics.cy, height - intrinsics.cy) ** 2
-    tangent = (1 - (1 - DARKEST) * strength) ** -0.5 - 1  # squared, at the corner: cos^4 is (1 + tan^2)^-2
-    share = 1 / np.square(1 + (y[:, None] + x) * np.float32(tangent / corner))
-    out = picture.copy()
-    out[..., :3] *= share[..., None]
-    return out
+EFFECT = EffectSpec(
+    name="chromatic_aberration",
+    options=_ChromaticAberration,
+    strongest="red 1 % larger and blue 1 % smaller than green, about the principal point",
+    stage="lens",
+    order=40,
+    apply=_apply,
+    record=5,
+)

@@ -4,7 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import Field
 
+from viewsphere.model.fields.frozen import Frozen
+from viewsphere.model.fields.numbers import Portion
+from viewsphere.plugins.effect import EffectSpec
+from viewsphere.rendering.effects import EffectContext
 from viewsphere.rendering.seen import Seen
 from viewsphere.rendering.spread import gaussian, spread_both_ways
 
@@ -17,11 +22,15 @@ WIDTH = 1 / 300
 """Width of the lines, in widths of the picture."""
 
 
-def edge_highlight(picture: Float32, strength: float, seen: Seen) -> Float32:
-    """The picture with lines that are blended towards white by `strength`; alpha is unchanged."""
-    if strength == 0:
-        return picture
-    share = _lines(seen)[..., None] * np.float32(strength)
+class _EdgeHighlight(Frozen):
+    """The strength."""
+
+    edge_highlight: Portion = Field(default=0.0, description="brighter edges")
+
+
+def _apply(picture: Float32, options: _EdgeHighlight, context: EffectContext) -> Float32:
+    """The picture with lines that are blended towards white; alpha is unchanged."""
+    share = _lines(context.seen)[..., None] * np.float32(options.edge_highlight)
     white = picture[..., 3:] if picture.shape[2] == 4 else np.float32(1)
     out = picture.copy()
     out[..., :3] += (white - picture[..., :3]) * share
@@ -62,3 +71,14 @@ def _beside(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
     out[:, 1:] |= mask[:, :-1]
     out[:, :-1] |= mask[:, 1:]
     return out
+
+
+EFFECT = EffectSpec(
+    name="edge_highlight",
+    options=_EdgeHighlight,
+    strongest="white lines, W / 300 wide, along the targets' borders and creases",
+    stage="objects",
+    order=10,
+    apply=_apply,
+    record=10,
+)
