@@ -29,8 +29,8 @@ LOSSLESS = (".png", ".qoi")
 def pictures(sample: Sample) -> Iterator[str]:
     """Yield each pair of a frame's pictures that differ by more than their precision.
 
-    Effects on bytes are in `rgb` alone, smoother and effects in no light, and a background picture is no light either: such pairs
-    are not compared.
+    Effects on bytes are in `rgb` alone, smoother and effects in no light, and a background picture is no light either. Such
+    pairs are not compared.
     """
     finish = sample.finish
     if finish is None or sum(name in sample.channels for name in ALL_PICTURES) < 2:
