@@ -204,7 +204,13 @@ def test_a_sensor_keeps_the_deep_picture_when_asked_for_rgb():
 
 # --- formats ------------------------------------------------------------------------------------------------------------------
 
-HOLDS = {"native": ALL_PICTURES, "webdataset": ALL_PICTURES, "hdf5": ALL_PICTURES, "nerfstudio": (*PICTURES, "rgb_linear")}
+HOLDS = {
+    "csv": ALL_PICTURES,
+    "native": ALL_PICTURES,
+    "webdataset": ALL_PICTURES,
+    "hdf5": ALL_PICTURES,
+    "nerfstudio": (*PICTURES, "rgb_linear"),
+}
 """The formats that hold pictures of more than eight bits; all others that need a picture refuse them."""
 
 NAMES = tuple(name for name in plugins.names("formats") if plugins.load(FormatSpec, name).writer is not None)

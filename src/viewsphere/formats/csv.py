@@ -1,7 +1,7 @@
 r"""A table for spreadsheets and data frames: one row for each object, with plain numbers and words.
 
     objects.csv                  a header, then a row for each object; UTF-8, commas, RFC 4180 with line ends \n
-    <split>/<index>.png, ...     the pictures that the rows name
+    <split>/<index>.png, ...     the pictures that the rows name, of any depth, as they are stored
 
 Empty cells mean unknown or none. Frames without objects have a row with their picture alone.
 
@@ -23,6 +23,7 @@ from pydantic import Field
 
 from viewsphere.files import open_file
 from viewsphere.formats.shared.writing.export_files import Expected, check_files, put
+from viewsphere.model.channel import ALL_PICTURES
 from viewsphere.model.fields.frozen import Frozen
 from viewsphere.model.sample import ObjectAnnotation, Sample
 from viewsphere.plugins.format import FormatSpec, Remark
@@ -168,6 +169,7 @@ FORMAT = FormatSpec(
     options=_Options,
     channels=(),  # pictures are used if there are any
     names_credits=False,
+    pictures=ALL_PICTURES,
     panoramas=True,
     writer=_writer,
     preparer=_preparer,
