@@ -41,7 +41,7 @@ def test_it_renders_labels_and_checks(tmp_path):
     straight = small_recipe(camera=CAMERA | {"distortion": None}, channels=CHANNELS, formats=[], time=time)
     generate(straight, tmp_path / "straight")
     assert not np.array_equal(Dataset(tmp_path / "straight")[0].instances, sample.instances)
-    with pytest.raises(UserError, match="expected lenses of OpenCV's models; found division of"):
+    with pytest.raises(UserError, match="expected lenses of COLMAP's models; found division of"):
         export(tmp_path / "out", ["colmap"])
 
 

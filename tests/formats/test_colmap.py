@@ -17,7 +17,9 @@ from truth_scenes import LENSES
 from viewsphere import Dataset, generate
 from viewsphere.composing.viewpoints.pose_files.colmap import read_colmap
 from viewsphere.errors import StoreError, UserError
+from viewsphere.formats.colmap.reading import read_model
 from viewsphere.geometry.camera import project
+from viewsphere.geometry.lenses import lens_parameters
 from viewsphere.run.datasets.importing import import_dataset
 from viewsphere.run.exports.exporting import export
 from viewsphere.store.samples.choice import Choice
@@ -152,6 +154,40 @@ def test_lenses(name, kind, tmp_path):
     found = np.array([camera.img_from_cam(point) for point in points])
     close("colmap", f"pycolmap: {name} lens", found, project(lens, points)[0], "px", atol=1e-9)
     close("colmap", f"pycolmap: points, {name} lens", *reprojected(model), "px", atol=1e-3)
+
+
+OTHERS = {
+    "EUCM": lens_parameters("eucm", alpha=0.6, beta=1.2),
+    "FOV": lens_parameters("fov", omega=0.8),
+    "DIVISION": lens_parameters("scaramuzza", coefficients=(-0.2,)),
+    "THIN_PRISM_FISHEYE": lens_parameters("thin_prism_fisheye", coefficients=(0.03, -0.004, 0.01, 0.02, 0.001, 0, 0.01, -0.02)),
+    "RAD_TAN_THIN_PRISM_FISHEYE": lens_parameters("fisheye624", coefficients=(0.03, -0.004, *[0.001] * 10)),
+}
+
+
+@pytest.mark.parametrize(("name", "kind"), [*zip(OTHERS, cycle(KINDS), strict=False)])
+def test_lenses_of_colmap_s_own(name, kind, tmp_path):
+    """pycolmap projects as the data set does, and viewsphere reads the same lens again."""
+    lens = LENS.model_copy(update={"distortion": OTHERS[name], "cx": 47.25})
+    dataset = make(tmp_path / "out", intrinsics=lens, channels=FEW)
+    folder = written(dataset, tmp_path / "made", kind)
+    points = np.random.default_rng(0).uniform([-0.5, -0.4, 1], [0.5, 0.4, 1], (200, 3))
+    points = points[np.hypot(*points[:, :2].T) > 0.011]  # COLMAP has a series for FOV near the axis
+    for model in models(folder).values():
+        (camera,) = model.cameras.values()
+        assert camera.model.name == name
+        close("colmap", f"pycolmap: {name}", camera.img_from_cam(points), project(lens, points)[0], "px", atol=1e-9)
+    for path in folder.glob("*/sparse/0"):
+        assert list(read_model(path).lenses.values()) == [lens]
+        if kind == "text":
+            assert read_colmap(path).intrinsics == lens
+
+
+def test_lenses_that_colmap_lacks_are_refused(tmp_path):
+    bent = lens_parameters("double_sphere", xi=0.1, alpha=0.5)
+    dataset = make(tmp_path / "out", intrinsics=LENS.model_copy(update={"distortion": bent}), channels=FEW)
+    with pytest.raises(UserError, match="expected lenses of COLMAP's models; found double_sphere of camera"):
+        written(dataset, tmp_path / "made", "text")
 
 
 def test_four_coefficients_are_the_model_opencv(tmp_path):

@@ -21,7 +21,7 @@ class TestEucm(LensProofs):
     def parameters(rng):
         return lens_parameters("eucm", alpha=rng.uniform(0.3, 0.8), beta=np.exp(rng.uniform(-0.7, 0.7)))
 
-    @pytest.mark.parametrize("alpha, beta", [(0.6, 1.1), (0.9, 0.5), (0.4, 2.0), (0.0, 1.0), (0.5, 1.0)])
+    @pytest.mark.parametrize("alpha, beta", [(0.6, 1.1), (0.9, 0.5), (0.4, 2.0), (0.0, 1.0), (0.5, 1.0), (1.0, 1.2)])
     def test_the_published_formula(self, alpha, beta):
         own = lens_parameters("eucm", alpha=alpha, beta=beta)
         assert_formula(own, 300, formula(alpha, beta), np.random.default_rng(3))

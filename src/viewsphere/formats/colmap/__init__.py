@@ -38,7 +38,7 @@ from viewsphere.formats.colmap.reading import read, source_cameras
 from viewsphere.formats.colmap.records import KINDS, Camera, Frame, Image, Record, Rig, pose_of
 from viewsphere.formats.shared.cameras import Moment, Rigs, world_of
 from viewsphere.formats.shared.writing.pictures import picture, suffix_of
-from viewsphere.formats.shared.writing.refusals import known_cameras, no_skew, opencv_lenses
+from viewsphere.formats.shared.writing.refusals import known_cameras, lenses, no_skew
 from viewsphere.formats.shared.writing.tree import File, Layout, Piece, Tree, functions
 from viewsphere.geometry.rotation import transform
 from viewsphere.model.fields.frozen import Frozen
@@ -57,10 +57,12 @@ class _Options(Frozen):
 
 
 def _refuses(scope: Scope, options: _Options) -> Iterator[str]:
-    """Reasons to refuse: unknown cameras, skew, lenses that OpenCV lacks, and splits named like a model's files."""
+    """Reasons to refuse: unknown cameras, skew, lenses that COLMAP lacks, and splits named like a model's files."""
     yield from known_cameras(scope)
     yield from no_skew(scope)
-    yield from opencv_lenses(scope)
+    for name, lens in lenses(scope):
+        if lens.lens.colmap is None:
+            yield f"expected lenses of COLMAP's models; found {lens.lens.name} of {name}"
     for name in (name for name in scope.splits if name in KINDS):
         yield f"expected splits of other names than {', '.join(KINDS)}; found {name}"
 

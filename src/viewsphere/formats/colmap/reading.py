@@ -24,6 +24,7 @@ from viewsphere.formats.shared.reading.posed_pictures import (
     without_world,
 )
 from viewsphere.geometry.lenses import LensParameters, opencv_parameters
+from viewsphere.geometry.lenses.shared.colmap import NAMES, PARAMETERS, has_own_lens, own_lens
 from viewsphere.geometry.rotation import matrix_from_quaternion, transform
 from viewsphere.model.listed import ListedShot
 from viewsphere.model.sensors.camera import Intrinsics
@@ -34,20 +35,6 @@ from viewsphere.store.source_cameras import SourceCameras, refuse_any
 _FOLDERS = ("", "sparse/0", "sparse", "dense/0", "dense")
 """The folders in which COLMAP's programs put meshes, relative to the folder of the data set."""
 
-PARAMETERS = {
-    "SIMPLE_PINHOLE": (0, "f cx cy"),
-    "PINHOLE": (1, "fx fy cx cy"),
-    "SIMPLE_RADIAL": (2, "f cx cy k1"),
-    "RADIAL": (3, "f cx cy k1 k2"),
-    "OPENCV": (4, "fx fy cx cy k1 k2 p1 p2"),
-    "OPENCV_FISHEYE": (5, "fx fy cx cy k1 k2 k3 k4"),
-    "FULL_OPENCV": (6, "fx fy cx cy k1 k2 p1 p2 k3 k4 k5 k6"),
-    "SIMPLE_RADIAL_FISHEYE": (8, "f cx cy k1"),
-    "RADIAL_FISHEYE": (9, "f cx cy k1 k2"),
-}
-"""Number and parameters of the lens models with an exact counterpart in viewsphere."""
-
-NAMES = {number: name for name, (number, _) in PARAMETERS.items()}
 OWN = {"cameras", "images", "points3D", "rigs", "frames"}
 
 
@@ -144,7 +131,9 @@ def _lens(model: str, size: tuple[int, int], values: Sequence[float]) -> Intrins
     p = dict(zip(names, values, strict=True))
     k1, k2, k3, k4, k5, k6, p1, p2 = (p.get(name, 0.0) for name in ("k1", "k2", "k3", "k4", "k5", "k6", "p1", "p2"))
     bent: LensParameters | None = None
-    if model.endswith("FISHEYE"):
+    if has_own_lens(model):
+        bent = own_lens(model, values)
+    elif model.endswith("FISHEYE"):
         bent = opencv_parameters((k1, k2, k3, k4), is_fisheye=True)
     elif any((k1, k2, k3, k4, k5, k6, p1, p2)):
         count = 8 if any((k4, k5, k6)) else 5 if k3 else 4

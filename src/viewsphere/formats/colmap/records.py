@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewsphere.errors import UserError
+from viewsphere.geometry.lenses.shared.colmap import PARAMETERS
 from viewsphere.geometry.rotation import quaternion_from_matrix
 from viewsphere.model.sensors.camera import Intrinsics
 
@@ -18,7 +19,6 @@ Float = NDArray[np.float64]
 Pose = tuple[float, ...]
 """A rotation as quaternion w, x, y, z, then the translation, metres."""
 
-MODELS = {"PINHOLE": 1, "OPENCV": 4, "OPENCV_FISHEYE": 5, "FULL_OPENCV": 6}
 CAMERA = 0
 """The number of the sensor type camera."""
 
@@ -30,17 +30,11 @@ def pose_of(R: Float, t: Float) -> Pose:
 
 def _lens_of(lens: Intrinsics) -> tuple[str, list[float]]:
     """The name of a lens' model, and its parameters. Raises UserError for a lens without a model."""
-    opencv = lens.lens.opencv
-    if lens.skew or opencv is None:
+    own = lens.lens.colmap
+    if lens.skew or own is None:
         found = f"{lens.skew:g}" if lens.skew else lens.lens.name
-        raise UserError(f"colmap: expected cameras without skew and with a lens of OpenCV's, found {found}")
-    shape = [lens.fx, lens.fy, lens.cx, lens.cy]
-    own = list(opencv.coefficients)
-    if not own:
-        return "PINHOLE", shape
-    if opencv.is_fisheye:
-        return "OPENCV_FISHEYE", shape + own
-    return ("OPENCV", shape + own) if len(own) == 4 else ("FULL_OPENCV", shape + own + [0.0] * (8 - len(own)))
+        raise UserError(f"colmap: expected cameras without skew and with a lens of COLMAP's, found {found}")
+    return own.model, [lens.fx, lens.fy, lens.cx, lens.cy, *own.parameters]
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,7 +53,7 @@ class Camera:
     def binary(self) -> bytes:
         """The record's bytes in a binary file."""
         model, values = _lens_of(self.lens)
-        head = struct.pack("<IiQQ", self.number, MODELS[model], self.lens.width, self.lens.height)
+        head = struct.pack("<IiQQ", self.number, PARAMETERS[model][0], self.lens.width, self.lens.height)
         return head + struct.pack(f"<{len(values)}d", *values)
 
 

@@ -111,6 +111,13 @@ class OpenCVLens(NamedTuple):
     coefficients: tuple[float, ...]
 
 
+class ColmapLens(NamedTuple):
+    """A lens in COLMAP's terms: a camera model whose parameters are fx, fy, cx, cy and then these."""
+
+    model: str
+    parameters: tuple[float, ...]
+
+
 class LensSpec(BaseModel):
     """A lens model: typed parameters, and functions whose first value is a `viewsphere.geometry.lenses.Lens`."""
 
@@ -181,6 +188,10 @@ class LensSpec(BaseModel):
     as_opencv: Callable[[Any], OpenCVLens] | None = Field(
         default=None,
         description="`as_opencv(lens)`: the same lens in OpenCV's terms, for formats that have its models; None: it has none",
+    )
+    as_colmap: Callable[[Any], ColmapLens | None] | None = Field(
+        default=None,
+        description="`as_colmap(lens)`: the same lens in COLMAP's terms, or None; None instead of a function: COLMAP has none",
     )
     ray_cells: int | None = Field(
         default=None,
@@ -264,6 +275,11 @@ class Lens:
     def opencv(self) -> OpenCVLens | None:
         """The same lens in OpenCV's terms, which many formats share; None if OpenCV has no such model."""
         return None if self.spec.as_opencv is None else self.spec.as_opencv(self)
+
+    @cached_property
+    def colmap(self) -> ColmapLens | None:
+        """The same lens in COLMAP's terms; None if COLMAP has no such model."""
+        return None if self.spec.as_colmap is None else self.spec.as_colmap(self)
 
     @property
     def record(self) -> dict[str, Any] | None:

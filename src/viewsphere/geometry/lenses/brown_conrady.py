@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
-from viewsphere.geometry.lenses import NEAR, Bounds, Lens, LensParameters, LensSpec, OpenCVLens, Rays, central
+from viewsphere.geometry.lenses import NEAR, Bounds, ColmapLens, Lens, LensParameters, LensSpec, OpenCVLens, Rays, central
 from viewsphere.geometry.lenses.shared.bent import BentLens, bent_bounds, first_positive_root, padded
 
 Float = NDArray[np.float64]
@@ -60,6 +60,12 @@ def _bounds(
 def _as_opencv(lens: Any) -> OpenCVLens:
     """The coefficients, unchanged."""
     return OpenCVLens(False, lens.parameters.coefficients)
+
+
+def _as_colmap(lens: Any) -> ColmapLens:
+    """OPENCV has four coefficients, FULL_OPENCV eight."""
+    own = lens.parameters.coefficients
+    return ColmapLens("OPENCV", own) if len(own) == 4 else ColmapLens("FULL_OPENCV", (*own, *[0.0] * (8 - len(own))))
 
 
 def limit(coefficients: tuple[float, ...]) -> float:
@@ -118,4 +124,5 @@ LENS = LensSpec(
     has_unit_rays=False,
     bounds=_bounds,
     as_opencv=_as_opencv,
+    as_colmap=_as_colmap,
 )

@@ -20,7 +20,7 @@ class DoubleSphere(LensParameters, frozen=True):
 
     model: Literal["double_sphere"] = Field(default="double_sphere", description="the double sphere model")
     xi: float = Field(gt=-1, lt=1, description="distance of the second sphere's centre ahead of the first one's")
-    alpha: float = Field(ge=0, lt=1, description="shift of the pinhole: alpha / (1 - alpha) ahead of the second centre")
+    alpha: float = Field(ge=0, le=1, description="shift of the pinhole: alpha / (1 - alpha) ahead of the second centre")
 
 
 def _to_plane(own: DoubleSphere, points: Float) -> Float:

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from viewsphere.geometry.lenses import LensParameters, LensSpec
+from viewsphere.geometry.lenses import ColmapLens, LensParameters, LensSpec
 from viewsphere.geometry.lenses.shared.image_plane import on_sphere, through_plane, unit
 from viewsphere.geometry.lenses.shared.unified import horizon, lifted
 
@@ -19,7 +19,7 @@ class Eucm(LensParameters, frozen=True):
     """A point is projected onto an ellipsoid, and then through a shifted pinhole; the unified model if beta is 1."""
 
     model: Literal["eucm"] = Field(default="eucm", description="the enhanced unified camera model")
-    alpha: float = Field(ge=0, lt=1, description="0: a pinhole")
+    alpha: float = Field(ge=0, le=1, description="0: a pinhole")
     beta: float = Field(default=1.0, ge=1e-3, le=1e3, description="flattening of the ellipsoid; 1: a sphere")
 
 
@@ -37,4 +37,9 @@ def _from_plane(own: Eucm, at: Float) -> Float:
     return unit(*lifted(at, own.alpha, own.beta).T)
 
 
-LENS = LensSpec(parameters=Eucm, **through_plane(_to_plane, _from_plane))
+def _as_colmap(lens: Any) -> ColmapLens:
+    """The same parameters."""
+    return ColmapLens("EUCM", (lens.parameters.alpha, lens.parameters.beta))
+
+
+LENS = LensSpec(parameters=Eucm, as_colmap=_as_colmap, **through_plane(_to_plane, _from_plane))

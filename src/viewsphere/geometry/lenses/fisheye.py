@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
-from viewsphere.geometry.lenses import Bounds, Lens, LensParameters, LensSpec, OpenCVLens, Rays, central
+from viewsphere.geometry.lenses import Bounds, ColmapLens, Lens, LensParameters, LensSpec, OpenCVLens, Rays, central
 from viewsphere.geometry.lenses.shared.bent import BentLens, bent_bounds, first_positive_root
 
 Float = NDArray[np.float64]
@@ -65,6 +65,11 @@ def _as_opencv(lens: Any) -> OpenCVLens:
     return OpenCVLens(True, lens.parameters.coefficients)
 
 
+def _as_colmap(lens: Any) -> ColmapLens:
+    """The coefficients, unchanged."""
+    return ColmapLens("OPENCV_FISHEYE", lens.parameters.coefficients)
+
+
 @lru_cache(maxsize=64)
 def limit(k: tuple[float, ...]) -> float:
     """The largest angle, radians, up to which the radius rises with the angle, so that the lens map is one-to-one."""
@@ -72,4 +77,12 @@ def limit(k: tuple[float, ...]) -> float:
     return min(math.pi, math.sqrt(first_positive_root(slope)))
 
 
-LENS = LensSpec(parameters=Fisheye, rays=_rays, project=_project, bounds=_bounds, focal=_focal, as_opencv=_as_opencv)
+LENS = LensSpec(
+    parameters=Fisheye,
+    rays=_rays,
+    project=_project,
+    bounds=_bounds,
+    focal=_focal,
+    as_opencv=_as_opencv,
+    as_colmap=_as_colmap,
+)

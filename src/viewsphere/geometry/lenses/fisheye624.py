@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
-from viewsphere.geometry.lenses import LensParameters, LensSpec
+from viewsphere.geometry.lenses import ColmapLens, LensParameters, LensSpec
 from viewsphere.geometry.lenses.shared.fisheye_plane import WIDEST, fisheye_functions
 from viewsphere.geometry.lenses.shared.warp import Bent, check_unfolded
 
@@ -47,4 +47,9 @@ def _bend(k: tuple[float, ...], x: Float, y: Float) -> Bent:
     return Bent(u, v, ua * ax + ub * mixed, ua * mixed + ub * by, va * ax + vb * mixed, va * mixed + vb * by)
 
 
-LENS = LensSpec(parameters=Fisheye624, **fisheye_functions(_bend))
+def _as_colmap(lens: Any) -> ColmapLens:
+    """The same coefficients."""
+    return ColmapLens("RAD_TAN_THIN_PRISM_FISHEYE", lens.parameters.coefficients)
+
+
+LENS = LensSpec(parameters=Fisheye624, as_colmap=_as_colmap, **fisheye_functions(_bend))

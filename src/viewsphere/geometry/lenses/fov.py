@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from viewsphere.geometry.lenses import LensParameters, LensSpec
+from viewsphere.geometry.lenses import ColmapLens, LensParameters, LensSpec
 from viewsphere.geometry.lenses.shared.image_plane import through_plane
 
 Float = NDArray[np.float64]
@@ -46,4 +46,9 @@ def _from_plane(own: Fov, at: Float) -> Float:
     return np.stack([at[:, 0] * scale, at[:, 1] * scale, 0 * scale + 1], axis=1)
 
 
-LENS = LensSpec(parameters=Fov, has_unit_rays=False, **through_plane(_to_plane, _from_plane))
+def _as_colmap(lens: Any) -> ColmapLens:
+    """The same parameter."""
+    return ColmapLens("FOV", (lens.parameters.omega,))
+
+
+LENS = LensSpec(parameters=Fov, as_colmap=_as_colmap, has_unit_rays=False, **through_plane(_to_plane, _from_plane))

@@ -8,7 +8,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from viewsphere.geometry.lenses import NEAR, Bounds, Lens, LensParameters, LensSpec, OpenCVLens, Rays, central
+from viewsphere.geometry.lenses import NEAR, Bounds, ColmapLens, Lens, LensParameters, LensSpec, OpenCVLens, Rays, central
 
 Float = NDArray[np.float64]
 
@@ -59,6 +59,11 @@ def _as_opencv(lens: Any) -> OpenCVLens:
     return OpenCVLens(False, ())
 
 
+def _as_colmap(_lens: Any) -> ColmapLens:
+    """No parameters."""
+    return ColmapLens("PINHOLE", ())
+
+
 LENS = LensSpec(
     parameters=Pinhole,
     rays=_rays,
@@ -68,4 +73,5 @@ LENS = LensSpec(
     bounds=_bounds,
     field_of_view=_field_of_view,
     as_opencv=_as_opencv,
+    as_colmap=_as_colmap,
 )

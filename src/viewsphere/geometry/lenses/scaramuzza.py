@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import Annotated, Literal, NamedTuple, Self
+from typing import Annotated, Any, Literal, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
-from viewsphere.geometry.lenses import LensParameters, LensSpec
+from viewsphere.geometry.lenses import ColmapLens, LensParameters, LensSpec
 from viewsphere.geometry.lenses.shared.bent import first_positive_root
 from viewsphere.geometry.lenses.shared.image_plane import on_sphere, through_plane, unit
 
@@ -41,9 +41,8 @@ class Scaramuzza(LensParameters, frozen=True):
     @model_validator(mode="after")
     def _unfolded(self) -> Self:
         if not (limit := _table(self.coefficients).radii[-1]) > 0.02:
-            raise ValueError(
-                f"expected coefficients without a fold near the axis; these fold the picture back at rho {limit:.2g}"
-            )
+            told = f"these fold the picture back at {limit:.2g} focal lengths"
+            raise ValueError(f"expected coefficients that show 1.1 degrees around the axis; {told}")
         return self
 
 
@@ -111,4 +110,10 @@ def _from_plane(own: Scaramuzza, at: Float) -> Float:
     return unit(x, y, np.where(rho <= limit, z, np.nan))
 
 
-LENS = LensSpec(parameters=Scaramuzza, **through_plane(_to_plane, _from_plane))
+def _as_colmap(lens: Any) -> ColmapLens | None:
+    """COLMAP's DIVISION, if c2 is the only coefficient."""
+    own = lens.parameters
+    return None if len(own.coefficients) > 1 or own.shear else ColmapLens("DIVISION", own.coefficients)
+
+
+LENS = LensSpec(parameters=Scaramuzza, as_colmap=_as_colmap, **through_plane(_to_plane, _from_plane))

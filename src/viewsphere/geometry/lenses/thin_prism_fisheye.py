@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
-from viewsphere.geometry.lenses import LensParameters, LensSpec
+from viewsphere.geometry.lenses import ColmapLens, LensParameters, LensSpec
 from viewsphere.geometry.lenses.shared.fisheye_plane import WIDEST, fisheye_functions
 from viewsphere.geometry.lenses.shared.warp import Bent, check_unfolded
 
@@ -41,4 +41,9 @@ def _bend(k: tuple[float, ...], x: Float, y: Float) -> Bent:
     return Bent(u, v, ux, mixed + 2 * sx * y, mixed + 2 * sy * x, vy)
 
 
-LENS = LensSpec(parameters=ThinPrismFisheye, **fisheye_functions(_bend))
+def _as_colmap(lens: Any) -> ColmapLens:
+    """The same coefficients."""
+    return ColmapLens("THIN_PRISM_FISHEYE", lens.parameters.coefficients)
+
+
+LENS = LensSpec(parameters=ThinPrismFisheye, as_colmap=_as_colmap, **fisheye_functions(_bend))

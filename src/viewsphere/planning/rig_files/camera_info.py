@@ -14,20 +14,21 @@ import numpy as np
 
 from viewsphere.errors import RecipeError
 from viewsphere.geometry.lenses import LensParameters
-from viewsphere.geometry.rotation import compose, rigid
+from viewsphere.geometry.rotation import rigid
 from viewsphere.planning.rig_files.documents import matrix, size
-from viewsphere.planning.rig_files.entries import Calibrated, brown_conrady, fisheye, inverse, pinhole, rotation
+from viewsphere.planning.rig_files.entries import Calibrated, brown_conrady, fisheye, pinhole, relative, rotation
 
 MODELS = ("plumb_bob", "rational_polynomial", "equidistant", "fisheye", "")
 
 
+def is_own(document: Mapping[str, Any]) -> bool:
+    """Return whether a document is a camera_info."""
+    return {"camera_matrix", "projection_matrix"} <= document.keys()
+
+
 def sensors(documents: Mapping[Path, dict[str, Any]], rectified: bool) -> tuple[Calibrated, ...]:
     """A sensor for each file, named by its `camera_name` or the file's name; the first sensor is the rig's origin."""
-    calibrated = [_camera(path, document, rectified) for path, document in documents.items()]
-    back = inverse(calibrated[0].rig_from_sensor[:3, :3], calibrated[0].rig_from_sensor[:3, 3])
-    first = Calibrated(calibrated[0].name, calibrated[0].lens, calibrated[0].distortion, np.eye(4), calibrated[0].size)
-    others = (Calibrated(c.name, c.lens, c.distortion, compose(back, c.rig_from_sensor), c.size) for c in calibrated[1:])
-    return first, *others
+    return relative([_camera(path, document, rectified) for path, document in documents.items()])
 
 
 def _camera(path: Path, found: Mapping[str, Any], rectified: bool) -> Calibrated:

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from viewsphere.composing.viewpoints.pose_files.lines import number, read_text
 from viewsphere.errors import RecipeError
+from viewsphere.planning.rig_files.encoded import colmap_lines, xml_document
 from viewsphere.recipe.reading.file import ShallowLoader
 
 Float = NDArray[np.float64]
@@ -42,11 +43,18 @@ _Loader.add_constructor("tag:yaml.org,2002:opencv-nd-matrix", _as_columns)
 
 
 def read_document(path: Path) -> dict[str, Any]:
-    """A calibration file's mapping; raises RecipeError for any other file.
+    """A calibration file's mapping; raises RecipeError for any other file. A .txt or .bin has `lines`, lists of words.
 
     OpenCV writes `%YAML:1.0`, which is not a valid YAML directive (https://docs.opencv.org/4.x/da/d56/group__core__xml.html).
     """
+    if path.suffix.lower() == ".bin":
+        return {"lines": colmap_lines(path)}
     text = read_text(path, "a calibration", "MAX_RIG_BYTES")
+    if path.suffix.lower() == ".txt":
+        lines = (line.split() for line in text.splitlines() if not line.lstrip().startswith("#"))
+        return {"lines": [words for words in lines if words]}
+    if path.suffix.lower() == ".xml":
+        return xml_document(path, text)
     if text.startswith("%YAML:"):
         text = text.partition("\n")[2]
     try:

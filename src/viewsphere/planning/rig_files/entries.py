@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from viewsphere.composing.viewpoints.pose_files.motions import nearest_rotation
 from viewsphere.errors import RecipeError
-from viewsphere.geometry.lenses import LensParameters, opencv_parameters
-from viewsphere.geometry.rotation import rigid, transform
+from viewsphere.geometry.lenses import LensParameters, lens_parameters, opencv_parameters
+from viewsphere.geometry.rotation import compose, rigid, transform
 from viewsphere.validation.errors import told_of
 
 Float = NDArray[np.float64]
@@ -38,23 +39,25 @@ class Calibrated:
 
 def pinhole(camera: Float, where: str) -> dict[str, float]:
     """The lens of a calibration's camera matrix (3, 3 or more), with pixels measured from the centre of the first one."""
-    fx, fy = float(camera[0, 0]), float(camera[1, 1])
+    return camera_matrix(*(float(camera[place]) for place in ((0, 0), (1, 1), (0, 2), (1, 2))), where=where)
+
+
+def camera_matrix(fx: float, fy: float, cx: float, cy: float, where: str) -> dict[str, float]:
+    """The lens of these entries of a camera matrix, with pixels measured from the centre of the first one."""
     if min(fx, fy) <= 0:
         raise RecipeError(f"{where}: expected focal lengths above 0; found {fx:g} and {fy:g}")
-    return {"fx": fx, "fy": fy, "cx": float(camera[0, 2]) + CENTER, "cy": float(camera[1, 2]) + CENTER}
+    return {"fx": fx, "fy": fy, "cx": cx + CENTER, "cy": cy + CENTER}
 
 
 def brown_conrady(numbers: Sequence[float], where: str) -> LensParameters | None:
-    """OpenCV's k1 k2 p1 p2 [k3 [k4 k5 k6 [s1 s2 s3 s4 [tx ty]]]], where all from s1 on must be 0; None if all are 0."""
+    """OpenCV's k1 k2 p1 p2 [k3 [k4 k5 k6 [s1 s2 s3 s4 [tx ty]]]]; None if all are 0."""
     if len(numbers) not in (0, 4, 5, 8, 12, 14):
         raise RecipeError(f"{where}: expected 4, 5, 8, 12 or 14 numbers; found {len(numbers)}")
-    if any(numbers[8:]):
-        raise RecipeError(
-            f"{where}: expected no thin prism and no tilted sensor; found numbers after k6: undistort the pictures"
-        )
     if not any(numbers):
         return None
     with told_of(where):
+        if any(numbers[8:]):
+            return lens_parameters("thin_prism", coefficients=tuple(numbers))
         return opencv_parameters(tuple(numbers[:8]))
 
 
@@ -78,3 +81,18 @@ def inverse(turn: Float, shift: Float) -> Float:
     """The inverse (4, 4) of the motion x -> turn x + shift."""
     back = np.ascontiguousarray(turn.T)
     return rigid(back, -transform(back, shift))
+
+
+def relative(sensors: Sequence[Calibrated]) -> tuple[Calibrated, ...]:
+    """The sensors with their poses in the first one's axes instead of common ones."""
+    first = sensors[0].rig_from_sensor
+    back = inverse(first[:3, :3], first[:3, 3])
+    others = (replace(sensor, rig_from_sensor=compose(back, sensor.rig_from_sensor)) for sensor in sensors[1:])
+    return replace(sensors[0], rig_from_sensor=np.eye(4)), *others
+
+
+def mapping(value: Any, where: str) -> dict[str, Any]:
+    """A mapping of a document; raises RecipeError for any other value."""
+    if not isinstance(value, dict):
+        raise RecipeError(f"{where}: expected a mapping; found {'nothing' if value is None else repr(value)[:40]}")
+    return cast("dict[str, Any]", value)

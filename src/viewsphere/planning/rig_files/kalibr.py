@@ -11,15 +11,24 @@ from typing import Any, cast
 import numpy as np
 
 from viewsphere.errors import RecipeError
-from viewsphere.geometry.lenses import LensParameters
+from viewsphere.geometry.lenses import LensParameters, lens_parameters
 from viewsphere.geometry.rotation import compose
 from viewsphere.planning.rig_files.documents import matrix, row, size
-from viewsphere.planning.rig_files.entries import Calibrated, brown_conrady, fisheye, inverse, pinhole, rotation
+from viewsphere.planning.rig_files.entries import Calibrated, brown_conrady, camera_matrix, fisheye, inverse, rotation
+from viewsphere.validation.errors import told_of
+
+MODELS = {"pinhole": (), "omni": ("xi",), "ds": ("xi", "alpha"), "eucm": ("alpha", "beta")}
+"""Camera models, and their intrinsics before fx, fy, cx and cy."""
+
+
+def is_own(document: Mapping[str, Any]) -> bool:
+    """Return whether a document is a camchain."""
+    return "cam0" in document
 
 
 def sensors(documents: Mapping[Path, dict[str, Any]], rectified: bool) -> tuple[Calibrated, ...]:
     """Return the cameras of the chain, named cam0, cam1, ...
-    Raises RecipeError for lenses other than a pinhole with radtan, equidistant or no distortion.
+    Raises RecipeError for other lenses than Kalibr's.
     """
     where = ", ".join(map(str, documents))
     if rectified:
@@ -42,17 +51,33 @@ def sensors(documents: Mapping[Path, dict[str, Any]], rectified: bool) -> tuple[
 
 
 def _camera(name: str, entry: Mapping[str, Any], pose: np.ndarray[Any, np.dtype[np.float64]], at: str) -> Calibrated:
-    if entry.get("camera_model", "pinhole") != "pinhole":
-        raise RecipeError(f"{at}: camera_model: expected pinhole; found {entry['camera_model']!r}: calibrate it as one")
-    numbers = row(entry.get("intrinsics"), f"{at}: intrinsics")
-    if len(numbers) != 4:
-        raise RecipeError(f"{at}: intrinsics: expected fx, fy, cx, cy; found {len(numbers)} numbers")
+    model = entry.get("camera_model", "pinhole")
+    if model not in MODELS:
+        raise RecipeError(f"{at}: camera_model: expected one of {', '.join(MODELS)}; found {model!r:.40}")
+    names, numbers = (*MODELS[model], "fx", "fy", "cx", "cy"), row(entry.get("intrinsics"), f"{at}: intrinsics")
+    if len(numbers) != len(names):
+        raise RecipeError(f"{at}: intrinsics: expected {', '.join(names)}; found {len(numbers)} numbers")
     extent = row(entry["resolution"], f"{at}: resolution") if "resolution" in entry else [None, None]
     if len(extent) != 2:
         raise RecipeError(f"{at}: resolution: expected [width, height]; found {len(extent)} numbers")
-    fx, fy, cx, cy = numbers
-    lens = pinhole(np.array([[fx, 0.0, cx], [0.0, fy, cy]]), f"{at}: intrinsics")
-    return Calibrated(name, lens, _distortion(entry, at), pose, size(extent[0], extent[1], f"{at}: resolution"))
+    lens = camera_matrix(*numbers[-4:], where=f"{at}: intrinsics")
+    distortion = _lens(model, dict(zip(MODELS[model], numbers, strict=False)), entry, at)
+    return Calibrated(name, lens, distortion, pose, size(extent[0], extent[1], f"{at}: resolution"))
+
+
+def _lens(model: str, own: dict[str, float], entry: Mapping[str, Any], at: str) -> LensParameters | None:
+    """The lens of a camera model with its `own` parameters and its distortion."""
+    bent = entry.get("distortion_model", "none")
+    if model == "pinhole":
+        return _distortion(entry, at)
+    if bent != "none" and (model, bent) != ("omni", "radtan"):
+        expected = "none or radtan" if model == "omni" else "none"
+        raise RecipeError(f"{at}: distortion_model: expected {expected} beside {model}; found {bent!r:.40}")
+    with told_of(f"{at}: intrinsics"):
+        if model != "omni":
+            return lens_parameters({"ds": "double_sphere"}.get(model, model), **own)
+        numbers = row(entry.get("distortion_coeffs"), f"{at}: distortion_coeffs") if bent == "radtan" else [0.0] * 4
+        return lens_parameters("unified", **own, coefficients=tuple(numbers))
 
 
 def _distortion(entry: Mapping[str, Any], at: str) -> LensParameters | None:
@@ -65,7 +90,12 @@ def _distortion(entry: Mapping[str, Any], at: str) -> LensParameters | None:
             return brown_conrady(numbers, f"{at}: distortion_coeffs")
         case "equidistant":
             return fisheye(numbers, f"{at}: distortion_coeffs")
+        case "fov":
+            if len(numbers) != 1:
+                raise RecipeError(f"{at}: distortion_coeffs: expected one number; found {len(numbers)}")
+            with told_of(f"{at}: distortion_coeffs"):
+                return lens_parameters("fov", omega=numbers[0])
         case _:
             raise RecipeError(
-                f"{at}: distortion_model: expected radtan, equidistant or none; found {model!r}: calibrate it as one"
+                f"{at}: distortion_model: expected radtan, equidistant, fov or none; found {model!r}: calibrate it as one"
             )

@@ -23,13 +23,20 @@ from viewsphere.planning.rig_files.entries import Calibrated, brown_conrady, fis
 Float = NDArray[np.float64]
 
 
+def is_own(document: Mapping[str, Any]) -> bool:
+    """Return whether a document is a calibration of OpenCV's: of a pair, or of one camera."""
+    return bool(document.keys() & {"K1", "M1", "R", "T"}) or "camera_matrix" in document
+
+
 def sensors(documents: Mapping[Path, dict[str, Any]], rectified: bool) -> tuple[Calibrated, ...]:
     """`left` and `right`: the raw cameras, or with `rectified` the pinholes of P1 and P2. Lenses with 4 coefficients are
-    fisheyes if the file has `model: fisheye`.
+    fisheyes if the file has `model: fisheye`. A file with one camera_matrix is a single camera, with the file's name.
     """
     where = ", ".join(map(str, documents))
     found = dict(chain.from_iterable(document.items() for document in documents.values()))
     extent = _size(found, where)
+    if "camera_matrix" in found:
+        return _single(found, rectified, next(iter(documents)).stem, where)
     if rectified:
         left, right = (matrix(found.get(name), f"{where}: {name}", (3, 4)) for name in ("P1", "P2"))
         lenses = [(pinhole(one, where), None) for one in (left, right)]  # which refuses focal lengths of 0
@@ -44,6 +51,17 @@ def sensors(documents: Mapping[Path, dict[str, Any]], rectified: bool) -> tuple[
         poses = np.eye(4), inverse(turn, shift)
     named = zip(("left", "right"), lenses, poses, strict=True)
     return tuple(Calibrated(name, lens, bent, pose, extent) for name, (lens, bent), pose in named)
+
+
+def _single(found: Mapping[str, Any], rectified: bool, name: str, where: str) -> tuple[Calibrated, ...]:
+    """One camera, as OpenCV's calibration programs write it; `fisheye_model: 1` makes it a fisheye."""
+    if rectified:
+        raise RecipeError(f"{where}: expected rectified: true beside P1 and P2; found one camera")
+    lens = pinhole(matrix(found["camera_matrix"], f"{where}: camera_matrix", (3, 3)), where)
+    given = found.get("distortion_coefficients")
+    numbers = [] if given is None else matrix(given, f"{where}: distortion_coefficients").ravel().tolist()
+    bent = (fisheye if found.get("fisheye_model") == 1 else brown_conrady)(numbers, f"{where}: distortion_coefficients")
+    return (Calibrated(name, lens, bent, np.eye(4), _size(found, where)),)
 
 
 def _camera(found: Mapping[str, Any], number: int, where: str) -> Float:

@@ -160,7 +160,7 @@ class RigFile(Frozen):
     path: Annotated[tuple[Annotated[str, Field(min_length=1)], ...], Field(min_length=1)] = Field(
         description="the file, or files: camera_info has one per camera, OpenCV can have one for lenses and one for R, T"
     )
-    format: Literal["auto", "opencv", "kalibr", "camera_info"] = Field(
+    format: Literal["auto", "opencv", "kalibr", "camera_info", "basalt", "aria", "colmap", "ocamcalib"] = Field(
         default="auto", description="auto: detected from the file's content"
     )
     rectified: bool = Field(default=False, strict=True, description="rectified pictures instead of raw ones: the pinholes of P")

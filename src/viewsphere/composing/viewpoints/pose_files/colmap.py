@@ -13,22 +13,10 @@ from viewsphere.composing.viewpoints.pose_files.lines import counted, number, nu
 from viewsphere.composing.viewpoints.pose_files.motions import from_quaternion, motion
 from viewsphere.errors import RecipeError
 from viewsphere.geometry.lenses import LensParameters, opencv_parameters
+from viewsphere.geometry.lenses.shared.colmap import PARAMETERS, has_own_lens, own_lens
 from viewsphere.geometry.rotation import transform
 from viewsphere.model.sensors.camera import Intrinsics
 from viewsphere.validation.errors import told_of
-
-PARAMETERS = {
-    "SIMPLE_PINHOLE": "f cx cy",
-    "PINHOLE": "fx fy cx cy",
-    "SIMPLE_RADIAL": "f cx cy k1",
-    "RADIAL": "f cx cy k1 k2",
-    "OPENCV": "fx fy cx cy k1 k2 p1 p2",
-    "FULL_OPENCV": "fx fy cx cy k1 k2 p1 p2 k3 k4 k5 k6",
-    "SIMPLE_RADIAL_FISHEYE": "f cx cy k1",
-    "RADIAL_FISHEYE": "f cx cy k1 k2",
-    "OPENCV_FISHEYE": "fx fy cx cy k1 k2 k3 k4",
-}
-"""Parameters of the camera models that have an exact counterpart here, in COLMAP's order."""
 
 MOST_IN_ONE_LINE = 10
 """Words of an image's line in images.txt; the last is the name, which may have spaces."""
@@ -40,7 +28,7 @@ def read_colmap(path: Path) -> PoseFile:
     `path` is the folder, or its images.txt. COLMAP's world has no defined up axis; usually y points down.
     """
     folder = path if path.is_dir() else path.parent
-    cameras = {int(words[0]): _camera(words, where) for words, where in _camera_lines(folder / "cameras.txt")}
+    cameras = {int(words[0]): colmap_camera(words, where) for words, where in _camera_lines(folder / "cameras.txt")}
     images = sorted(_images(folder / "images.txt"), key=lambda image: image[0])
     for name, camera, _ in images:
         if camera not in cameras:
@@ -57,11 +45,12 @@ def _camera_lines(file: Path) -> list[tuple[list[str], str]]:
     return lines
 
 
-def _camera(words: Sequence[str], where: str) -> Intrinsics:
+def colmap_camera(words: Sequence[str], where: str) -> Intrinsics:
+    """The lens of a line CAMERA_ID MODEL WIDTH HEIGHT PARAMS; raises RecipeError, beginning with `where`, for invalid ones."""
     model = words[1]
     if model not in PARAMETERS:
         raise RecipeError(f"{where}: expected one of {', '.join(PARAMETERS)}; found {model}: undistort the images first")
-    names = PARAMETERS[model].split()
+    names = PARAMETERS[model][1].split()
     width, height = numbers(words[2:4], where)
     p = dict(zip(names, counted(words[4:], len(names), where), strict=True))
     fx = p.get("fx", p.get("f", 0.0))
@@ -73,6 +62,8 @@ def _camera(words: Sequence[str], where: str) -> Intrinsics:
 
 
 def _distortion(model: str, p: dict[str, float]) -> LensParameters | None:
+    if has_own_lens(model):
+        return own_lens(model, tuple(p.values()))
     k1, k2, k3, k4, k5, k6, p1, p2 = (p.get(n, 0.0) for n in ("k1", "k2", "k3", "k4", "k5", "k6", "p1", "p2"))
     if model.endswith("FISHEYE"):
         return opencv_parameters((k1, k2, k3, k4), is_fisheye=True)
