@@ -42,6 +42,9 @@ FLAT = 1e-9
 FARTHEST = math.tan(1.57)
 """The largest radius in the plane z = 1 that is examined: 89.95 degrees off the axis."""
 
+STEEPEST = 1e3
+"""The slope, beside a slope of 1 at the axis, at which a map ends: near a rational map's pole, positions lose their digits."""
+
 NEAREST = 0.02
 """The smallest radius, radians or focal lengths, within which a usable map is one-to-one: 1.1 degrees."""
 
@@ -100,9 +103,11 @@ def _limit(bend: Map, k: tuple[float, ...], farthest: float) -> float:
         """Whether the Jacobian's symmetric part is positive definite on circles of radius r (N,)."""
         at = bend(k, np.outer(r, cosine).ravel(), np.outer(r, sine).ravel())
         half, shear = (at.ux - at.vy) / 2, (at.uy + at.vx) / 2
-        least = ((at.ux + at.vy) / 2 - np.sqrt(half * half + shear * shear)).reshape(len(r), ANGLES)
+        middle, spread = (at.ux + at.vy) / 2, np.sqrt(half * half + shear * shear)
+        least = (middle - spread).reshape(len(r), ANGLES)
         low, high = least.min(axis=1), least.max(axis=1)
-        return low - BETWEEN * (high - low) > FLAT * (1 if farthest <= math.pi else 1 / (1 + r * r))
+        is_rising = low - BETWEEN * (high - low) > FLAT * (1 if farthest <= math.pi else 1 / (1 + r * r))
+        return is_rising & ((middle + spread).reshape(len(r), ANGLES).max(axis=1) < STEEPEST)
 
     radii = np.tan(np.linspace(0.0, math.atan(farthest), RADII))[1:]
     radii[-1] = farthest
@@ -187,7 +192,7 @@ class Warp:
             index, state = index[going], state[:, going]
             if not len(index):
                 break
-        solved = np.sqrt(error) <= EXACT * (1 + away)
+        solved = np.isfinite(error) & (np.sqrt(error) <= EXACT * (1 + away))
         inside = solved & (x * x + y * y <= self.limit * self.limit)
         return np.where(inside, x, np.nan), np.where(inside, y, np.nan)
 
