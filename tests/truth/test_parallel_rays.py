@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -10,12 +11,17 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from truth_scenes import cube, mesh_of, orbit_camera, placed, sphere
+from viewsphere import Recipe
+from viewsphere.assets.cache import load_normalised
 from viewsphere.geometry.box import projected_bounds
 from viewsphere.geometry.camera import project
 from viewsphere.geometry.lenses import lens_parameters
 from viewsphere.labels import observe
 from viewsphere.model.sensors.camera import Camera, Intrinsics
+from viewsphere.planning.models import numbered_specs
 from viewsphere.truth.raster.visibility import rasterize
+
+MODELS = Path(__file__).parents[2].parent / "shared" / "models"
 
 PROFILE = settings(max_examples=15, derandomize=True, deadline=None, database=None)
 PARALLEL = lens_parameters("orthographic")
@@ -133,6 +139,25 @@ def test_every_pixel_of_a_scene_shows_what_its_ray_meets_first(seed):
     geometry = scene()[2]
     wrong, error, _ = wrong_pixels(without_far_ground(geometry), random_camera(np.random.default_rng(seed)))
     assert not wrong and error < 1e-9
+
+
+@pytest.mark.parametrize("source", ["zoo:car", "zoo:chair", "fuze.obj", "awkward/huge_coords_1e7.obj"])
+def test_every_pixel_of_a_model_shows_what_its_ray_meets_first(source):
+    """Two scenes of the zoo, and two files where they are present."""
+    pytest.importorskip("embreex")
+    file = MODELS / source if "/" in source else MODELS / "misc" / source
+    if not source.startswith("zoo:") and not file.is_file():
+        pytest.skip("no shared models here")
+    model = {"source": source} if source.startswith("zoo:") else {"source": str(file), "category": "thing"}
+    views = {"azimuth": 0, "elevation": 10, "distance": 3}
+    recipe = Recipe.model_validate({"name": "x", "models": [model], "viewpoints": views})
+    geometry = placed(load_normalised(next(iter(numbered_specs(recipe)))[0]), moves=[np.eye(4)])
+    size = float(np.linalg.norm(np.ptp(geometry.vertices, axis=0)))
+    rng = np.random.default_rng(5)
+    for _ in range(2):
+        angles = rng.uniform(0, 2 * np.pi), rng.uniform(-0.3, 1.2)
+        wrong, error, count = wrong_pixels(geometry, orbit_camera(parallel(160, 120, 1.1 * size), *angles, 1.5 * size))
+        assert not wrong and error < 1e-9 and count > 500
 
 
 def without_far_ground(geometry):

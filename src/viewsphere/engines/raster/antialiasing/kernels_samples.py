@@ -487,8 +487,10 @@ def _cast_parallel(surface, p, x, y, offsets, alpha_masks, triangles, solid, fra
     for m in range(nearest.shape[1]):
         px, py = x + offsets[0, m], y + offsets[1, m]
         inside, e0, e1, e2 = covers(edges, checked, px, py)
+        if not inside:
+            continue
         z = depth_at(slope, bounds, px, py)
-        if not inside or z <= 0.0:
+        if z <= 0.0:
             continue
         inverse, at = 1.0 / z, (U(p), U(m))
         if is_see_through:

@@ -298,6 +298,13 @@ def view_of(baked: Baked, camera: Camera, samples: Samples | None = None) -> Pic
 
 def _shifts(baked: Baked, camera: Camera, samples: Samples | None) -> Float32:
     """From the eye to where the parallel rays of pixel centres, or of these samples, begin, (S, 3) in the stage's axes."""
-    lens = camera.lens
-    begin = lens.origins().reshape(-1, 3) if samples is None else lens.rays(samples.position).origins
-    return (begin @ camera.R / baked.unit).astype(np.float32)
+
+    def begin(xy: NDArray[np.floating]) -> Float32:
+        return (camera.lens.rays(xy).origins @ camera.R / baked.unit).astype(np.float32)
+
+    if samples is not None:
+        return begin(samples.position)
+    # The places are linear in the picture, so those of its first row and first column give all.
+    x, y = np.arange(camera.width) + 0.5, np.arange(camera.height) + 0.5
+    row, column = begin(np.column_stack([x, np.full_like(x, 0.5)])), begin(np.column_stack([np.full_like(y, 0.5), y]))
+    return (row + (column - column[:1])[:, None]).reshape(-1, 3)
