@@ -26,5 +26,5 @@ SEED_NAMES = {**{name: name for name in _UNCHANGED.split()}, **_RENAMED}
 
 
 def seed_name(field: str) -> str:
-    """The name that seeds the draws of a field. Fields of effects and of third-party plug-ins are seeded by their own names."""
+    """The name that seeds the draws of a field. A plug-in's field without a name here is seeded by its own name."""
     return SEED_NAMES.get(field, field)
