@@ -9,7 +9,8 @@
     fiftyone.Dataset.from_dir(dataset_dir="...", dataset_type=fiftyone.types.FiftyOneDataset)
 
 A picture has its split as a tag, and `sequence`, `sensor`, `instant` and `time`. If its camera is known, it has `K` (pixels
-from the picture's corner) and `world_from_camera` (x right, y down, z ahead; metres). `ground_truth` lists the visible objects:
+from the picture's corner), `world_from_camera` (x right, y down, z ahead; metres), and for lenses other than pinholes
+`distortion` (the model and its parameters). `ground_truth` lists the visible objects:
 label, bounding_box (x, y, width and height of the visible pixels, as shares of the picture), mask, index (the object id,
 constant over a sequence), supercategory, model, visibility and truncation. `location`, `dimensions` and `rotation` are the 3D
 box in the world (z up): its centre, its size along the object's x, y and z (front -y) in metres, and its angles around x, y and
@@ -124,6 +125,8 @@ def _taken(sample: Sample) -> dict[str, Any]:
         camera, motion = sample.camera, np.eye(4)
         motion[:3, :3], motion[:3, 3] = camera.R.T, camera.center
         said |= {"K": camera.K.tolist(), "world_from_camera": motion.tolist()}
+        if camera.lens.record is not None:
+            said["distortion"] = camera.lens.record
     return said
 
 

@@ -65,7 +65,7 @@ def sensors(documents: Mapping[Path, dict[str, Any]], rectified: bool) -> tuple[
     if not len(cameras[0]) or len({len(entries) for entries in cameras}) > 1:
         counts = ", ".join(str(len(entries)) for entries in cameras)
         raise RecipeError(f"{where}: expected equally many intrinsics, T_imu_cam and resolution; found {counts}")
-    return relative([_camera(i, *entry, where) for i, entry in enumerate(zip(*cameras, strict=True))])
+    return relative([_camera(i, a, b, c, where) for i, (a, b, c) in enumerate(zip(*cameras, strict=True))])
 
 
 def _listed(value: Any, where: str) -> list[Any]:

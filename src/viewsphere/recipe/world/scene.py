@@ -187,12 +187,12 @@ class CameraEntry(WithProjection):
         else:
             assert self.fov_deg is not None
             across = width if self.fov_axis == "horizontal" else height
-            fx = fy = _focal(self.fov_deg, across, self.distortion)
+            fx = fy = _focal_length(self.fov_deg, across, self.distortion)
         with told_of("camera"):
             return Intrinsics(width=width, height=height, fx=fx, fy=fy, cx=cx, cy=cy, skew=skew, distortion=self.distortion)
 
 
-def _focal(fov_deg: float, extent: int, distortion: LensParameters | None) -> float:
+def _focal_length(fov_deg: float, extent: int, distortion: LensParameters | None) -> float:
     try:
         return focal_from_fov(math.radians(fov_deg), extent, distortion)
     except ValueError as error:
