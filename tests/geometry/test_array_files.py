@@ -33,12 +33,13 @@ def numbers(shape, dtype=np.float32):
     return array
 
 
-def inflated(stream) -> bytes:
+def assert_comes_back(array):
+    stream, checksum = deflate(array)
     machine = zlib.decompressobj(-15)
-    data = machine.decompress(stream)
+    assert machine.decompress(stream) == array.tobytes()
     assert machine.eof
     assert not machine.unused_data
-    return data
+    assert checksum == zlib.adler32(array)
 
 
 @pytest.mark.slow
@@ -48,26 +49,33 @@ def test_any_runs_come_back(runs, components):
     pixels = [np.repeat(rng.random((1, components)), n, 0) if same else rng.random((n, components)) for n, same in runs]
     array = np.concatenate(pixels).astype(np.float32)[None]
     array = array[..., 0] if components == 1 else array
-    assert inflated(deflate(array)) == array.tobytes()
+    assert_comes_back(array)
 
 
 def test_every_length_of_a_run_comes_back():
     for length in range(1, 900):
         array = np.full((1, length), 0.3, np.float32)
         array[0, 0] = 7
-        assert inflated(deflate(array)) == array.tobytes()
+        assert_comes_back(array)
 
 
 def test_deflate_is_small_for_runs_and_never_much_larger_than_its_input():
     noise = np.random.default_rng(0).random((300, 301, 3)).astype(np.float32)
-    assert inflated(deflate(noise)) == noise.tobytes()
-    assert len(deflate(noise)) <= noise.nbytes + 5 * (noise.nbytes // STORED) + 64
-    assert len(deflate(np.zeros((480, 640, 3), np.float32))) < 3 * 480 * 640 * 4 / 100
+    assert_comes_back(noise)
+    assert len(deflate(noise)[0]) <= noise.nbytes + 5 * (noise.nbytes // STORED) + 64
+    assert len(deflate(np.zeros((480, 640, 3), np.float32))[0]) < 3 * 480 * 640 * 4 / 100
+
+
+def test_the_checksum_of_long_runs():
+    for shape in ((1, 700_001), (2_000, 1_500, 3)):
+        array = np.full(shape, -3e38, np.float32)
+        array[-1, -1] = np.nan
+        assert deflate(array)[1] == zlib.adler32(array)
 
 
 def test_deflate_of_other_arrays():
     for array in (np.arange(24, dtype=np.int32).reshape(4, 6), np.ones((4, 5, 2), np.float32), np.eye(9, dtype=np.uint8)):
-        assert inflated(deflate(array)) == array.tobytes()
+        assert_comes_back(array)
 
 
 @pytest.mark.parametrize("shape", SHAPES)

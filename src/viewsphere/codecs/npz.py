@@ -30,7 +30,7 @@ def encode_npz(array: NDArray[Any], name: str) -> bytes:
     np.lib.format.write_array_header_1_0(head, np.lib.format.header_data_from_array_1_0(array))
     header = head.getvalue()
     first = struct.pack("<BHH", 0, len(header), len(header) ^ 0xFFFF) + header  # a separate stored block
-    stream = deflate(array)
+    stream, _ = deflate(array)
     check = isal_zlib.crc32(array, isal_zlib.crc32(header))
     member = f"{name}.npy".encode("ascii")
     sizes = struct.pack("<III", check, len(first) + len(stream), len(header) + array.nbytes)

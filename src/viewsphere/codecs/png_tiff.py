@@ -197,7 +197,8 @@ def encode_tiff(array: NDArray[Any]) -> bytes:
         raise ValueError(f"encode_tiff: expected (H, W) or (H, W, 1..3) float32 or int32, got {array.shape} {array.dtype}")
     height, width = array.shape[:2]
     little = np.ascontiguousarray(array, array.dtype.newbyteorder("<"))
-    strip = (b"\x78\x01", deflate(little), struct.pack(">I", isal_zlib.adler32(little)))
+    stream, checksum = deflate(little)
+    strip = (b"\x78\x01", stream, struct.pack(">I", checksum))
     return b"".join((_tiff_head(height, width, components, array.dtype, sum(map(len, strip))), *strip))
 
 

@@ -36,8 +36,8 @@ def compressed(array: NDArray[Any], window: int = ZLIB) -> bytes:
     return b"".join((head, deflator.compress(data[HEAD:]), deflator.flush()))
 
 
-def deflate(array: NDArray[Any]) -> bytes | memoryview:
-    """The raw deflate stream of an array's bytes in C order.
+def deflate(array: NDArray[Any]) -> tuple[bytes | memoryview, int]:
+    """The raw deflate stream of an array's bytes in C order, and their Adler-32 checksum.
 
     For float32 pixels (H, W) or (H, W, 3), only runs of equal pixels are coded, since other matches cost more than they save;
     see `kernels_deflate`.
@@ -45,13 +45,13 @@ def deflate(array: NDArray[Any]) -> bytes | memoryview:
     step = 1 if array.ndim == 2 else array.shape[-1]
     array = np.ascontiguousarray(array)
     if array.dtype.newbyteorder("=") != np.float32 or step not in (1, 3):
-        return compressed(array, RAW)
+        return compressed(array, RAW), isal_zlib.adler32(array)
     from viewsphere.codecs.deflate.kernels_deflate import STORED, deflate_runs, match_codes
 
     data = array.reshape(-1).view(np.uint8)
     out = np.empty(data.size + 5 * (data.size // STORED) + 64, np.uint8)
-    end = deflate_runs(data.view(np.uint32), step, *match_codes(4 * step), data, out, 0)
-    return out[:end].data
+    end, checksum = deflate_runs(data.view(np.uint32), step, *match_codes(4 * step), data, out, 0)
+    return out[:end].data, checksum
 
 
 def deflate_lines(lines: NDArray[np.uint8], step: int) -> bytes:

@@ -17,6 +17,7 @@ SHORTEST = 64  # bytes: the shortest run that makes up for two blocks
 LONGEST = 258
 AHEAD = 96  # words compared at once: whole pixels of 1 and of 3 words; fewer would be unrolled instead of vectorised
 STORED = 65535
+MODULUS, PIECE = 65521, 4096  # of an Adler-32 checksum; bytes whose weighted sum fits into 32 bits
 
 
 @cache
@@ -39,14 +40,15 @@ def match_codes(distance: int) -> tuple[np.ndarray, np.ndarray]:
 
 @njit
 def deflate_runs(words, step, codes, widths, data, out, at):
-    """Write the raw deflate stream of `data` (bytes, not empty) into `out` from index `at`; return the index after its end.
+    """Write the raw deflate stream of `data` (bytes, not empty) into `out` from index `at`; return the index after its end, and
+    the data's Adler-32 checksum (RFC 1950).
 
     `words` are the same bytes as 32-bit words, `step` (1 or 3) of which make a pixel; `codes` and `widths` are from
-    `match_codes`.
+    `match_codes`. The checksum of a run follows from that of one pixel, so that runs are read once.
     """
     count, second, third = len(words), step // 3, 2 * (step // 3)
     waiting, bits = np.uint64(0), 0
-    i, literal = 0, 0
+    i, literal, low, high = 0, 0, 1, 0
     while i < count:
         i = _next_run(words, step, i)
         a, b, c = words[U(i)], words[U(i + second)], words[U(i + third)]
@@ -69,9 +71,12 @@ def deflate_runs(words, step, codes, widths, data, out, at):
                 to, begin = U(at), U(literal)
                 for k in range(U(size)):
                     out[to + k] = data[begin + k]
+                low, high = _add_bytes(data, literal, size, low, high)
                 at, literal = at + size, literal + size
             waiting |= np.uint64(0b011 if is_last else 0b010) << np.uint64(bits)  # a block of type 1, repeating a pixel
             bits += 3
+            if is_run:
+                low, high = _add_run(data, 4 * i, 4 * step, (j - i) // step - 1, low, high)
             while is_run and left > 0:
                 length = left if left <= LONGEST else min(left - 3, LONGEST)
                 left -= length
@@ -80,7 +85,34 @@ def deflate_runs(words, step, codes, widths, data, out, at):
             at, waiting, bits = send(out, at, waiting, bits + 7)
             literal = 4 * j
         i = j
-    return send(out, at, waiting, (bits + 7) // 8 * 8)[0]
+    return send(out, at, waiting, (bits + 7) // 8 * 8)[0], high << 16 | low
+
+
+@inner
+def _add_bytes(data, begin, size, low, high):
+    """Both halves of the checksum after `size` further bytes, from `begin` on."""
+    for first in range(begin, begin + size, PIECE):
+        n = U(min(PIECE, begin + size - first))
+        total, weighted = np.uint32(0), np.uint32(0)
+        for k in range(n):
+            byte = np.uint32(data[U(first) + k])
+            total += byte
+            weighted += np.uint32(n - k) * byte
+        high = (high + np.int64(n) * low + np.int64(weighted)) % MODULUS
+        low = (low + np.int64(total)) % MODULUS
+    return low, high
+
+
+@inner
+def _add_run(data, begin, size, times, low, high):
+    """Both halves of the checksum after so many repetitions of the `size` bytes from `begin` on."""
+    total, weighted = 0, 0
+    for k in range(size):
+        byte = np.int64(data[U(begin + k)])
+        total, weighted = total + byte, weighted + (size - k) * byte
+    pairs = times * (times - 1) // 2 % MODULUS
+    high = (high + times * size % MODULUS * low + times * weighted + pairs * size * total) % MODULUS
+    return (low + times * total) % MODULUS, high
 
 
 @inner

@@ -196,8 +196,9 @@ class LabelContext:
         (first, stop), (base, end) = g.triangle_start[i : i + 2], g.vertex_start[i : i + 2]
         if first < stop and self.camera.lens.is_straight and is_behind(self.camera, g.bounds[i]):
             return None, False
-        triangles = g.triangles[first:stop] - np.int32(base)
-        return projected_bounds(self.camera, g.places(i), triangles, g.is_used[base:end])
+        triangles = g.triangles[first:stop]
+        own = triangles - np.int32(base) if base else triangles  # saves a large array for an object alone
+        return projected_bounds(self.camera, g.places(i), own, g.is_used[base:end])
 
     def is_unobstructed(self, i: int) -> bool:
         """Return whether nothing can hide any part of the object of id i + 1: its 2D box meets no other object's box, there

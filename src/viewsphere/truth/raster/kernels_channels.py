@@ -11,9 +11,11 @@ import math
 import numpy as np
 
 from viewsphere.kernels.jit import inner, njit
+from viewsphere.kernels.prefetching import prefetch
 
 ONE = np.float32(1)
 NONE = -2  # means no triangle yet; the background is -1
+SOON = np.uintp(8)  # pixels to the right, whose triangle is prefetched
 AHEAD = 64  # pixels that are compared at once: enough for compilers to emit vectors instead of unrolling
 
 
@@ -238,7 +240,7 @@ def normals_shading(seen, triangles, q, rays, values, side, triangle_normals, ca
     height, width = seen.shape
     table = rays.shape[0] > 0
     m = camera_from_p
-    a, b, c = np.uintp(0), np.uintp(1), np.uintp(2)
+    a, b, c, three, four = np.uintp(0), np.uintp(1), np.uintp(2), np.uintp(3), np.uintp(4)
     last, nx, ny, nz = NONE, 0.0, 0.0, 0.0
     for y in range(height):
         uy = np.uintp(y)
@@ -248,6 +250,10 @@ def normals_shading(seen, triangles, q, rays, values, side, triangle_normals, ca
             if t == last:
                 out[uy, ux, a], out[uy, ux, b], out[uy, ux, c] = nx, ny, nz
                 continue
+            soon = np.uintp(max(seen[uy, min(ux + SOON, np.uintp(width) - b)], np.int32(0)))
+            for k in (a, b, c):
+                prefetch(q, four * np.uintp(triangles[soon, k]))
+                prefetch(values, three * np.uintp(triangles[soon, k]))
             if t < 0:
                 last, nx, ny, nz = -1, 0.0, 0.0, 0.0
                 out[uy, ux, a], out[uy, ux, b], out[uy, ux, c] = nx, ny, nz

@@ -24,6 +24,7 @@ LEVEL = 1.01  # greatest ratio of such a surface's depths in neighbouring pixels
 VISIBLE = f4(0.05)  # relative difference of radiance: about five steps of 8 bits
 SHARP = f4(0.2)  # likewise within glass: such steps are borders of refracted things, finer than textures behind the glass
 DARK = f4(0.02)  # radiance below which differences are compared with this radiance
+SPAN = 64  # pixels that are compared at once
 TILE = 8  # pixels of a tile's side
 CLOSED = np.int32(2**31 - 1)
 
@@ -41,18 +42,61 @@ def compare(triangle, depth, owner, normals, room, owners, beside, above):
     a, b, c, d, eight = U(0), U(1), U(2), U(3), U(8)
     stride = U(room.shape[1])
     reals, wholes = room.reshape(-1), owners.reshape(-1)
+    first, stop = _borders(triangle, 0)
     for y in range(U(height)):
+        begin, end = first, stop
+        first, stop = _borders(triangle, y + b) if y + b < U(height) else (U(width), a)
         m, k = (y & b) * U(4), (y & b) * c
-        for x in range(U(width)):
+        for x in range(max(min(begin, first), b) - b, max(end, stop)):
             t, at = triangle[y, x], x + eight
             u = U(max(t, np.int32(0)))
             room[m, at], room[m + b, at], room[m + c, at] = normals[u, a], normals[u, b], normals[u, c]
             room[m + d, at], owners[k, at], owners[k + b, at] = depth[y, x], owner[u] | (t >> np.int32(31)), t
-        here, whole = m * stride + eight, k * stride + eight
-        _differ(width, reals, here, here - b, wholes, whole, whole - b, stride, beside, y * U(width))
+        here, whole, row = m * stride + eight + begin, k * stride + eight + begin, y * U(width)
+        count = np.intp(end) - np.intp(begin)
+        _differ(count, reals, here, here - b, wholes, whole, whole - b, stride, beside, row + begin)
+        _keep_within(begin, end, row, U(width), beside)
         if y > 0:
-            there, other = (U(4) - m) * stride + eight, (c - k) * stride + eight
-            _differ(width, reals, here, there, wholes, whole, other, stride, above, y * U(width))
+            there, other = (U(4) - m) * stride + eight + begin, (c - k) * stride + eight + begin
+            _differ(count, reals, here, there, wholes, whole, other, stride, above, row + begin)
+            _keep_within(begin, end, row, U(width), above)
+
+
+@inner
+def _borders(triangle, y):
+    """Columns [begin, end) beyond which the pixels of a row show the same triangle as the pixels beside and above them; (W, 0)
+    if all do.
+    """
+    width, above = U(triangle.shape[1]), max(np.intp(y) - 1, 0)
+    begin, end = U(0), width
+    while begin < end and _is_even(triangle, U(y), U(above), begin, min(begin + U(SPAN), width)):
+        begin += U(SPAN)
+    if begin >= end:
+        return width, U(0)
+    while end > begin + U(SPAN) and _is_even(triangle, U(y), U(above), end - U(SPAN), end):
+        end -= U(SPAN)
+    return begin, end
+
+
+@inner
+def _is_even(triangle, y, above, begin, end):
+    """Return whether these pixels of a row show the triangle of the pixel beside each, and of that in the row `above`."""
+    different = np.int32(0)
+    if begin == 0:
+        different, begin = triangle[y, begin] ^ triangle[above, begin], U(1)
+    for x in range(begin, end):
+        own = triangle[y, x]
+        different |= (own ^ triangle[y, x - U(1)]) | (own ^ triangle[above, x])
+    return different == 0
+
+
+@inner
+def _keep_within(begin, end, row, width, flags):
+    """Clear a row's flags outside of columns [begin, end)."""
+    for x in range(min(begin, width)):
+        flags[row + x] = 0
+    for x in range(max(end, U(0)), width):
+        flags[row + x] = 0
 
 
 @lanewise

@@ -41,10 +41,10 @@ def on_others(q, triangles, runs, cutout, owner, triangle, depth, shown, lines):
             shown[i] = -1
             if (q[i, c] > 0.0) & (x >= 0.0) & (y >= 0.0) & (x < width) & (y < height):
                 row, column = U(np.int64(y)), U(np.int64(x))
-                level = depth[row, column]
-                here = f4(q[i, d])
-                if (here > level * (f4(1) - BEHIND)) & (here < level * (f4(1) + BEFORE)):
-                    shown[i] = owner[U(triangle[row, column])]
+                level, t = depth[row, column], triangle[row, column]
+                here, o = f4(q[i, d]), owner[U(max(t, np.int32(0)))]
+                is_on = (here > level * (f4(1) - BEHIND)) & (here < level * (f4(1) + BEFORE))
+                shown[i] = o if is_on else np.int32(-1)
     for k in range(of_triangles.shape[0]):
         for t in range(U(of_triangles[k, 0]), U(of_triangles[k, 1])):
             o = owner[t]

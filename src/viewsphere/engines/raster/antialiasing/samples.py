@@ -356,9 +356,10 @@ def _within(runs: Runs, marks: Bool) -> NDArray[np.int64]:
     return found[0] if len(found) == 1 else np.concatenate([np.empty(0, np.int64), *found])
 
 
-def _room(width: int) -> tuple[NDArray[np.uint32], Float32]:
-    """Scratch of `kernels_edges.draw`: pixels of a triangle, and 1/z at the samples of one pixel."""
-    return np.empty(max(width, kernels_edges.NARROW**2) + 1, np.uint32), np.empty(4, np.float32)
+def _room(width: int) -> tuple[NDArray[np.uint32], Marks, Float32]:
+    """Scratch of `kernels_edges.draw`: pixels of a triangle, the samples inside it, and 1/z at the samples."""
+    count = max(width, kernels_edges.NARROW**2) + 1
+    return np.empty(count, np.uint32), np.empty(count, np.uint8), np.empty((count, 4), np.float32)
 
 
 def _differing(count: int, *known: NDArray[Any]) -> tuple[Int32, Float32, Int32, Float32]:

@@ -31,6 +31,7 @@ from viewsphere.kernels.lanes import (
     store,
     where,
 )
+from viewsphere.kernels.prefetching import prefetch
 
 f4 = nb.float32
 i4 = nb.int32
@@ -57,23 +58,6 @@ QUAD_ROWS = 7
 # Rows of integers: level's size and first word; neighbours along u and v; texels' first words; each sample's first quad.
 Q_WIDTH, Q_HEIGHT, Q_START, X0, X1, Y0, Y1, P0, P1, P2, P3, FIRST = range(0, 12 * QUADS, QUADS)
 PLACE_ROWS = 12
-
-
-@intrinsic
-def _fetch(typing, array, index):
-    """Prefetch a word of an array into the processor's cache."""
-
-    def code(context, builder, signature, arguments):
-        data = context.make_array(signature.args[0])(context, builder, arguments[0]).data
-        word = builder.bitcast(builder.gep(data, [arguments[1]]), ir.IntType(8).as_pointer())
-        flag = ir.IntType(32)
-        function = builder.module.declare_intrinsic(
-            "llvm.prefetch.p0", fnty=ir.FunctionType(ir.VoidType(), [word.type, flag, flag, flag])
-        )
-        builder.call(function, [word, flag(0), flag(3), flag(1)])
-        return context.get_dummy_value()
-
-    return nb.void(array, nb.uintp), code
 
 
 def _sums(*parts):
@@ -214,8 +198,8 @@ def place(texels, levels, mode, count, c, q, places):
     level = U(u4(c[LOW]))  # neighbouring samples read about the same level
     if levels[level, 1] * levels[level, 2] * channels > NEAR:
         for k in range(quads):
-            _fetch(texels, U(u4(places[U(P0) + k])))
-            _fetch(texels, U(u4(places[U(P2) + k])))
+            prefetch(texels, U(u4(places[U(P0) + k])))
+            prefetch(texels, U(u4(places[U(P2) + k])))
 
 
 @lanewise

@@ -63,6 +63,7 @@ from viewsphere.kernels.lanes import (
     spread,
     where,
 )
+from viewsphere.kernels.prefetching import AHEAD, prefetch
 from viewsphere.rendering.ground.horizon import BEGIN, FLAT, OVER
 from viewsphere.rendering.ground.kernels_slabs import shade
 
@@ -178,7 +179,11 @@ def gather(surfaces, count, triangle, b, own, material):
     replace their slots.
     """
     vertices, triangles, normals = surfaces.vertices, surfaces.triangles, surfaces.normals
+    last = U(count) - U(1)
     for i in range(U(count)):
+        t = U(triangle[U(own[min(i + U(AHEAD), last)])])
+        for k in range(U(3)):
+            prefetch(vertices, U(VERTEX) * U(triangles[t, k]))
         t = U(triangle[U(own[i])])
         own[i], m = t, surfaces.material[t]
         material[i] = m

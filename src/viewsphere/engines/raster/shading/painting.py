@@ -190,13 +190,14 @@ def shade_all(
     # Layers are also listed if a solid surface is in front, because a decal may be on that surface.
     pixels = None if samples is None else samples.pixels
     stack = layers(baked.blended, camera, triangle, depth, baked.see_through, pixels, visibility.corners)
-    reached = depth.copy()  # 1/depth up to which light has been attenuated
+    reached = depth if air is None else depth.copy()  # 1/depth up to which air has attenuated light
     first, behind = _nearest_glass(baked, stack, len(triangle)), triangle
     for i, layer in enumerate(stack):
-        if air is not None and i > 0:
-            on, near = _veiled(baked, air, layer.slot, behind[layer.slot], layer.inverse_depth)
-            air.veil(radiance, air.depth(reached[on], on) - air.depth(near, on), on)
-        reached[layer.slot] = layer.inverse_depth
+        if air is not None:
+            if i > 0:
+                on, near = _veiled(baked, air, layer.slot, behind[layer.slot], layer.inverse_depth)
+                air.veil(radiance, air.depth(reached[on], on) - air.depth(near, on), on)
+            reached[layer.slot] = layer.inverse_depth
         behind, behind_depth = triangle.copy(), depth.copy()
         behind[layer.slot], behind_depth[layer.slot] = layer.triangle, layer.inverse_depth
         is_ground, is_bent = baked.kind[layer.triangle] == kernels_paint.FLOOR, first[layer.slot] == i
