@@ -58,7 +58,7 @@ def tight_box(box: Box, period: int | None, mask: Callable[[], NDArray[np.bool_]
     x0, y0, x1, y1 = box
     if period is None or 2 * (x1 - x0) <= period:
         return box
-    x0, x1 = interval_of_columns(mask().any(axis=0))
+    x0, x1 = interval_of_columns(np.asarray(mask().any(axis=0), np.bool_))
     return x0, y0, x1, y1
 
 

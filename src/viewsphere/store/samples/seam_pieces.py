@@ -44,10 +44,10 @@ def _piece(
         extra |= {"obb": smallest_rectangle(convex_hull(mask_outline(mask))), "obb_projected": None}
     if "amodal" in extra:
         whole = decode_rle(o.amodal.height, o.amodal.width, o.amodal.counts) & columns
-        extra |= {"amodal": Rle(*whole.shape, encode_rle(whole)), "box2d_amodal": _floats(mask_box(whole))}
+        extra |= {"amodal": _coded(whole), "box2d_amodal": _floats(mask_box(whole))}
     return replace(
         o,
-        rle=Rle(*mask.shape, encode_rle(mask)),
+        rle=_coded(mask),
         area=int(mask.sum()),
         box2d=_floats(mask_box(mask)),
         box2d_projected=_side(o.box2d_projected, number, period),
@@ -76,6 +76,11 @@ def _side(box: Box | None, number: int, period: int) -> Box | None:
 def _moved(box: Box | None, number: int, period: int) -> Box | None:
     """A whole box, at the turn of the circle in which it is at that side of the picture."""
     return box if box is None or number == 1 or box[2] <= period else (box[0] - period, box[1], box[2] - period, box[3])
+
+
+def _coded(mask: NDArray[np.bool_]) -> Rle:
+    height, width = mask.shape
+    return Rle(height, width, encode_rle(mask))
 
 
 def _floats(box: tuple[int, int, int, int] | None) -> Box | None:
