@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from viewsphere.composing.scene.sun import sun_position
+from viewsphere.composing.scene.draws import sun_position
 
 
 def test_the_example_of_nrel_s_algorithm():

@@ -11,7 +11,7 @@ import pytest
 from cube_dataset import CHANNELS, make
 from viewsphere import Dataset
 from viewsphere.errors import UserError
-from viewsphere.formats.huggingface import Options, verify
+from viewsphere.formats.huggingface import FORMAT, Options
 from viewsphere.labels import channels
 from viewsphere.model.fields.files import Files
 from viewsphere.run.datasets.importing import import_dataset
@@ -89,7 +89,7 @@ def test_it_streams_shards_in_order(datasets, dataset, tmp_path):
     for split in dataset.splits:
         found = loaded(datasets, folder, tmp_path, split=split, streaming=True)
         assert [row["index"] for row in found] == [sample.index for sample in dataset if sample.split == split]
-    assert list(verify(dataset, folder, (), Options(samples_per_shard=2))) == []
+    assert list(FORMAT.verify(dataset, folder, (), Options(samples_per_shard=2))) == []
 
 
 def test_files_that_pillow_cannot_read_are_made_anew(datasets, tmp_path):
@@ -122,7 +122,7 @@ def test_its_proof_names_the_row(dataset, tmp_path):
     changed = table.set_column(table.schema.get_field_index("time"), table.schema.field("time"), [column])
     file.unlink()
     parquet.write_table(changed, file)
-    ((frame, line),) = verify(dataset, folder, (), Options())
+    ((frame, line),) = FORMAT.verify(dataset, folder, (), Options())
     assert frame == table["index"][-1].as_py()
     assert line == "data/train-00000.parquet: expected the time that is exported, found another: export again"
 
@@ -136,7 +136,7 @@ def test_another_pyarrows_bytes_are_no_damage(dataset, tmp_path):
     file.unlink()
     file.write_bytes(data.replace(wrote, wrote[:-1] + b"9"))
     assert data != file.read_bytes()
-    assert list(verify(dataset, folder, (), Options())) == []
+    assert list(FORMAT.verify(dataset, folder, (), Options())) == []
 
 
 def test_splits_of_names_that_datasets_refuses(datasets, dataset, tmp_path, monkeypatch):

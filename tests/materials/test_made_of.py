@@ -8,10 +8,9 @@ import pytest
 import viewsphere as vs
 from animated import let_walk
 from small import ROOT
-from viewsphere.assets.appearance.box_mapping import box_mapped
 from viewsphere.assets.appearance.description import appearance_of, words
 from viewsphere.assets.appearance.pbr import pictures_of
-from viewsphere.assets.appearance.repaint import textured
+from viewsphere.assets.appearance.repaint import box_mapped, textured
 from viewsphere.assets.mesh import Material
 from viewsphere.assets.primitive import face_normals
 from viewsphere.check import check

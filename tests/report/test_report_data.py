@@ -10,13 +10,12 @@ import yaml
 
 from viewsphere.errors import StoreError, UserError
 from viewsphere.report import Proof, chosen_frames, report_data, write_report
-from viewsphere.report.cells import sphere_cells
 from viewsphere.report.frames import frame_data
 from viewsphere.report.meshes import mesh_data, simplified
 from viewsphere.report.page import script_json
 from viewsphere.report.paths import without_folders
 from viewsphere.report.pictures import Scale, coordinate_colors, depth_colors, layers, layers_within, normal_colors
-from viewsphere.report.summary import hues, nice_edges, summary
+from viewsphere.report.summary import hues, nice_edges, sphere_cells, summary
 from viewsphere.report.table import FRAME, OBJECT, FrameTable, read_table
 from viewsphere.store import Dataset
 

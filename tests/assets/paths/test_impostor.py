@@ -3,7 +3,7 @@
 import pytest
 
 from viewsphere.assets.load import load_model
-from viewsphere.assets.paths.impostor import impostor
+from viewsphere.assets.paths.folder import impostor
 from viewsphere.assets.readers import suffixes
 from viewsphere.errors import ModelError
 

@@ -130,7 +130,7 @@ def no_packages(monkeypatch):
     find = importlib.util.find_spec
     absent = {"DracoPy", "meshopt", "opengl_basisu"}
     monkeypatch.setattr(
-        "viewsphere.assets.readers.gltf.compression.find_spec", lambda name: None if name in absent else find(name)
+        "viewsphere.assets.readers.gltf.document.find_spec", lambda name: None if name in absent else find(name)
     )
 
 

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from polygons import comb, is_inside, shoelace, star, turned
 from viewsphere.assets.paths.folder import ModelFolder
-from viewsphere.assets.readers.shared.polygon_holes import without_holes
+from viewsphere.assets.readers.dae.mesh import without_holes
 from viewsphere.assets.readers.shared.polygon_proof import cut_polygons
 
 SEEDS = st.integers(0, 2**32 - 1)

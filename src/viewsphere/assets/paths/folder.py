@@ -6,10 +6,12 @@ import base64
 import binascii
 import io
 import os
+import re
 import warnings
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from itertools import chain
 from pathlib import Path
 from typing import Any
 from urllib.parse import unquote, unquote_to_bytes
@@ -18,11 +20,34 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewsphere.assets.mesh import Image
+from viewsphere.assets.paths.finder import PICTURES as PICTURE_ENDINGS
 from viewsphere.assets.paths.finder import Finder, NotFoundError
-from viewsphere.assets.paths.impostor import impostor, wrong_kind
+from viewsphere.assets.readers import readers
 from viewsphere.errors import ModelError
 from viewsphere.files import read_bytes
 from viewsphere.limits import limits
+
+_HEAD = 4096
+"""Number of leading bytes examined, enough for a server's message or the start of a page."""
+
+_PAGE = re.compile(rb"(?is)\s*(?:<!--.*?-->\s*)*<(?:!doctype html|html|head|body|script)\b")
+
+_MESSAGE = re.compile(
+    rb"(?is)\s*(?:(?:error:? )?[45]\d\d\b|not found\b|access denied\b|forbidden\b|(?:<\?xml[^>]*>\s*)?<error>"
+    rb"|\{(?!.*\"asset\")[^{]*\"(?:message|error|detail)\"\s*:)"
+)
+"""Replies of servers instead of a file: an HTTP status, a store's XML, or JSON with a message."""
+
+_ARCHIVES = {
+    b"PK\x03\x04": "ZIP",
+    b"\x1f\x8b\x08": "gzip",
+    b"7z\xbc\xaf\x27\x1c": "7z",
+    b"Rar!": "RAR",
+    b"\xfd7zXZ": "xz",
+    b"BZh": "bzip2",
+}
+
+_PICTURES = {b"\x89PNG": "PNG", b"\xff\xd8\xff": "JPEG", b"RIFF": "WebP", b"GIF8": "GIF"}
 
 SHARPEST = 4096
 """Longest side, in texels, of textures after reduction: five of 8,192 would need more than a gigabyte per worker."""
@@ -127,7 +152,7 @@ class ModelFolder:
             raise self.error(f"cannot be read: {error.strerror or error}") from None
         if not data:
             raise self.error("the file is empty; export the model again")
-        instead = impostor(data) or wrong_kind(data, self.model.suffix[1:].lower())
+        instead = impostor(data) or _wrong_kind(data, self.model.suffix[1:].lower())
         if instead is not None:
             raise self.error(f"expected a model, found {instead}")
         return data
@@ -310,3 +335,40 @@ def _data_uri(uri: str) -> bytes:
 
 def _short(text: str) -> str:
     return repr(text if len(text) <= 120 else text[:117] + "...")
+
+
+def impostor(data: bytes) -> str | None:
+    """A description of a stand-in for a file (a pointer, or a server's page or message), and the fix; None for other data."""
+    head = data[:_HEAD].removeprefix(b"\xef\xbb\xbf")
+    return _pointer(head) or _from_server(head, len(data))
+
+
+def _wrong_kind(data: bytes, suffix: str) -> str | None:
+    """A description of a file whose first bytes show that it is not a model with this suffix, and the fix; None if unknown."""
+    kind = next((name for magic, name in _ARCHIVES.items() if data.startswith(magic)), None)
+    if kind is not None and all(reader.archives.get(suffix) != kind for reader in readers().values()):
+        return f"a {kind} archive; unpack it and name the file in it"
+    for magic, endings in chain.from_iterable(reader.first_bytes.items() for reader in readers().values()):
+        if data.startswith(magic) and suffix not in endings:
+            return f"one of another kind; rename the file so that it ends in .{endings[0]}"
+    picture = next((name for magic, name in _PICTURES.items() if data.startswith(magic)), None)
+    return None if picture is None or f".{suffix}" in PICTURE_ENDINGS else f"a {picture} picture; name the model's file"
+
+
+def _pointer(head: bytes) -> str | None:
+    if head.startswith(b"version https://git-lfs.github.com/spec/"):
+        size = re.search(rb"(?m)^size (\d+)", head)
+        left = f", whose {int(size[1]):,} bytes are not downloaded" if size else ""
+        return f"a git-lfs pointer to the file{left}; run `git lfs pull` in its repository"
+    if head.lstrip(b"./").startswith((b"annex/objects/", b"git/annex/objects/")):
+        return "a git-annex pointer to the file; run `git annex get` in its repository"
+    return None
+
+
+def _from_server(head: bytes, size: int) -> str | None:
+    if _PAGE.match(head):
+        return "a web page (HTML); download the file itself (on GitHub: the button Download raw file)"
+    if size <= _HEAD and _MESSAGE.match(head):
+        text = " ".join(head.decode(errors="replace").split())[:80]
+        return f"the message of a server ({text!r}); download the file again"
+    return None

@@ -38,6 +38,7 @@ https://arxiv.org/abs/1804.06534, and the data set's readme; https://github.com/
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping
 from typing import Any, Literal
 
@@ -47,17 +48,29 @@ from pydantic import Field
 
 from viewsphere.errors import UserError
 from viewsphere.formats import Scope
-from viewsphere.formats.falling_things.entries import annotation, box_of, camera_data, class_of, lens_settings, model_settings
 from viewsphere.formats.shared.writing.paper import json_bytes
 from viewsphere.formats.shared.writing.pictures import depth_png, picture, png
 from viewsphere.formats.shared.writing.refusals import known_cameras, pinhole
 from viewsphere.formats.shared.writing.tree import File, Layout, Piece, Tree, functions
+from viewsphere.geometry.box3d import Box3d
+from viewsphere.geometry.rotation import compose, quaternion_from_matrix, rigid, transform
 from viewsphere.model.channel import missing
 from viewsphere.model.fields.frozen import Frozen
-from viewsphere.model.sample import Sample
+from viewsphere.model.sample import ObjectAnnotation, Sample
+from viewsphere.model.sensors.camera import Camera, Intrinsics
 from viewsphere.model.sensors.rig import Rig
 from viewsphere.plugins.format import FormatSpec
-from viewsphere.store import Dataset
+from viewsphere.store import Dataset, ModelInfo
+
+_CM = 100.0
+
+_CUBOID = ((-1, -1, 1), (1, -1, 1), (1, -1, -1), (-1, -1, -1), (-1, 1, 1), (1, 1, 1), (1, 1, -1), (-1, 1, -1))
+"""The sides of a box's corners in FAT's order."""
+
+_OBJECT_FROM_FAT = np.array([[-1.0, 0, 0], [0, 0, -1], [0, -1, 0]])
+"""FAT's x is the object's right, viewsphere's -x; its y is down, viewsphere's -z; its z is ahead, viewsphere's -y."""
+
+_PERMUTED = np.array([[0.0, 0, 1, 0], [1, 0, 0, 0], [0, -1, 0, 0], [0, 0, 0, 1]])
 
 CHANNELS = ("rgb", "depth", "instances")
 FOLDER = 1000
@@ -138,36 +151,114 @@ class FallingThings(Tree):
             return own
         if not self._is_single(sample):
             return f"FallingThings/mixed/{own}"
-        return f"FallingThings/single/{class_of(sample.objects[0]) if sample.objects else 'none'}/{own}"
+        return f"FallingThings/single/{_class_of(sample.objects[0]) if sample.objects else 'none'}/{own}"
 
     def _class_map(self, sample: Sample) -> NDArray[np.uint8]:
         """The number of the class that each pixel shows, (H, W)."""
         table = np.zeros(max((o.id for o in sample.objects), default=0) + 1, np.uint8)
         for o in sample.objects:
-            table[o.id] = SINGLE if self._is_single(sample) else self._classes[class_of(o)]
+            table[o.id] = SINGLE if self._is_single(sample) else self._classes[_class_of(o)]
         ids = sample.channels["instances"]
         return np.where(ids < len(table), table[np.minimum(ids, len(table) - 1)], 0).astype(np.uint8)
 
     def _frame(self, sample: Sample) -> dict[str, Any]:
         matrix = "pose_transform_permuted" if self._is_fat else "pose_transform"
-        boxed = (o for o in sample.objects if o.is_placed and box_of(o) is not None)
+        boxed = (o for o in sample.objects if o.is_placed and _box_of(o) is not None)
         return {
-            "camera_data": camera_data(sample.camera),
-            "objects": [annotation(o, sample.camera.K, matrix) for o in boxed],
+            "camera_data": _camera_data(sample.camera),
+            "objects": [_annotation(o, sample.camera.K, matrix) for o in boxed],
         }
 
     def layout(self, path: str, counts: Mapping[str, int]) -> Layout:
         """A folder's settings."""
         if path.endswith("_camera_settings.json"):
-            return (json_bytes({"camera_settings": [lens_settings(side, lens) for side, lens in self._lenses]}),)
+            return (json_bytes({"camera_settings": [_lens_settings(side, lens) for side, lens in self._lenses]}),)
         only = path.split("/")[2] if path.startswith("FallingThings/single/") else None
         shown = {info.track or info.key: info for info in reversed(self.dataset.models)}
         shown = {name: shown[name] for name in self._classes if name in shown and only in (None, name)}
-        objects = [model_settings(info, name, SINGLE if only else self._classes[name]) for name, info in shown.items()]
+        objects = [_model_settings(info, name, SINGLE if only else self._classes[name]) for name, info in shown.items()]
         return (json_bytes({"exported_object_classes": list(shown), "exported_objects": objects}),)
 
 
 preparer, writer, verify = functions(FallingThings)
+
+
+def _camera_data(camera: Camera) -> dict[str, Any]:
+    """Return the pose of the camera in the world, and its lens."""
+    k = camera.intrinsics
+    return {
+        "location_worldframe": (camera.center * _CM).tolist(),
+        "quaternion_xyzw_worldframe": _xyzw(camera.R.T),
+        "intrinsics": {"fx": k.fx, "fy": k.fy, "cx": k.cx, "cy": k.cy},
+    }
+
+
+def _class_of(o: ObjectAnnotation) -> str:
+    """The name of an object's class: its model's key."""
+    return o.track or o.key
+
+
+def _xyzw(rotation: NDArray[np.float64]) -> list[float]:
+    w, x, y, z = quaternion_from_matrix(rotation)
+    return [x, y, z, w]
+
+
+def _box_of(o: ObjectAnnotation) -> tuple[float, float, float, float] | None:
+    """The box of the projected model, which may extend beyond the picture; None if no part of it is projected."""
+    return o.box2d_unclipped or o.box2d_projected
+
+
+def _annotation(o: ObjectAnnotation, k: NDArray[np.float64], matrix: str) -> dict[str, Any]:
+    """The record of an object with a box. `k` is (3, 3); `matrix` is the permuted pose's key."""
+    center = o.box3d_object.mean(axis=0)
+    pose = compose(o.camera_from_object, rigid(_OBJECT_FROM_FAT, center))
+    pose[:3, 3] *= _CM
+    middle, corners, box = pose[:3, 3], Box3d(o.box3d_camera).corners_at(_CUBOID) * _CM, _box_of(o)
+    assert box is not None
+    inside = 1 - o.truncation
+    return {
+        "class": _class_of(o),
+        "instance_id": o.id,
+        "visibility": min(o.visibility / inside, 1.0) if inside > 0 else 0.0,
+        "location": middle.tolist(),
+        "quaternion_xyzw": _xyzw(pose[:3, :3]),
+        matrix: compose(pose, _PERMUTED.T).T.tolist(),
+        "cuboid_centroid": middle.tolist(),
+        "projected_cuboid_centroid": _projected(k, middle[None])[0],
+        "bounding_box": {"top_left": [box[1], box[0]], "bottom_right": [box[3], box[2]]},
+        "cuboid": corners.tolist(),
+        "projected_cuboid": _projected(k, corners),
+    }
+
+
+def _projected(k: NDArray[np.float64], points: NDArray[np.float64]) -> list[list[float]]:
+    """Pixels of points (N, 3) in camera axes."""
+    return [[x / z, y / z] if z > 0 else [-1.0, -1.0] for x, y, z in transform(k, points).tolist()]
+
+
+def _lens_settings(name: str, lens: Intrinsics) -> dict[str, Any]:
+    """A camera of _camera_settings.json."""
+    return {
+        "name": name,
+        "horizontal_fov": math.degrees(2 * math.atan(lens.width / (2 * lens.fx))),
+        "intrinsic_settings": {
+            "resX": lens.width, "resY": lens.height, "fx": lens.fx, "fy": lens.fy, "cx": lens.cx, "cy": lens.cy, "s": lens.skew,
+        },
+        "captured_image_size": {"width": lens.width, "height": lens.height},
+    }  # fmt: skip
+
+
+def _model_settings(info: ModelInfo, name: str, number: int) -> dict[str, Any]:
+    """A class of _object_settings.json, and its number."""
+    width, height, length = Box3d(info.box3d_object).size
+    turn = _OBJECT_FROM_FAT.T * _CM
+    fixed = rigid(turn, -transform(turn, info.box3d_object.mean(axis=0)))
+    return {
+        "class": name,
+        "segmentation_class_id": number,
+        "fixed_model_transform": fixed.T.tolist(),
+        "cuboid_dimensions": [width * _CM, height * _CM, length * _CM],
+    }
 
 
 FORMAT = FormatSpec(

@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import lru_cache, partial
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from viewsphere.errors import StoreError
-from viewsphere.formats.kitti.labels import LEVEL, MOST_TRACKS, Labels, Row, read_camera, read_labels
 from viewsphere.formats.kitti.writing import NAMES
 from viewsphere.formats.shared.kitti import DONT_CARE
 from viewsphere.formats.shared.reading.image_lists import (
@@ -23,24 +23,47 @@ from viewsphere.formats.shared.reading.image_lists import (
     listed_dataset,
     lists,
     one_line,
+    text_of,
     unposed,
 )
 from viewsphere.formats.shared.reading.placed_objects import placed
 from viewsphere.formats.shared.reading.posed_pictures import picture_inside
 from viewsphere.geometry.box3d import Box3d
-from viewsphere.geometry.rotation import rigid
-from viewsphere.model.sample import ObjectAnnotation, Sample
-from viewsphere.model.sensors.camera import Camera
+from viewsphere.geometry.rotation import inverse, rigid, transform
+from viewsphere.limits import limits
+from viewsphere.model.sample import Box, ObjectAnnotation, Sample
+from viewsphere.model.sensors.camera import Camera, Intrinsics
 from viewsphere.store import Category
 from viewsphere.store.foreign import ForeignDataset, foreign_object
 from viewsphere.store.paths import file_inside, is_name
 from viewsphere.urls.inside import is_inside
 
+_LEVEL = np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]])
+"""The rotation to the axes of KITTI's reference camera, from a world with z up in which this camera is the origin and looks
+along y.
+"""
+
+_FARTHEST = 1e6
+"""Limit of all numbers of a label, pixels or metres."""
+
+_SHORTEST = 1e-3
+"""Least focal length, pixels."""
+
+Number = TypeVar("Number", int, float)
+
+_MOST_TRACKS = 10**6
+"""Largest number of a frame or track in an imported file; larger ones are mistakes."""
+
+_COLUMNS = 15
+"""Columns of an object's line, without a score."""
+
+_DONT_CARE_TYPE = "DontCare"
+
 SUFFIXES = (".png", ".jpg", ".jpeg")
 FILES_KEPT = 4
 """Number of label files to keep for the next picture of their sequence."""
 
-Of = Callable[[Path, bool], Labels]
+Of = Callable[[Path, bool], "_Labels"]
 
 
 @dataclass(frozen=True)
@@ -100,7 +123,7 @@ def read(path: Path, *, keep_going: bool = False) -> ForeignDataset:
     if not places:
         expected = "training/image_2 and label_2, or image_02 and label_02"
         raise StoreError(f"{path}: expected a KITTI data set ({expected}); found no such folders")
-    problems, labels_of = list[str](), lru_cache(FILES_KEPT)(read_labels)
+    problems, labels_of = list[str](), lru_cache(FILES_KEPT)(_read_labels)
     pictures = sorted(_pictures(path, places, labels_of, problems), key=lambda one: (one.file.parent, one.name))
     found = {picture.said[0]: picture.is_tracked for picture in pictures}
     kinds, ids, most = set[str](), set[int](), 1
@@ -130,7 +153,7 @@ def _places(root: Path) -> Iterator[_Place]:
 
 def _pictures(root: Path, places: tuple[_Place, ...], labels_of: Of, problems: list[str]) -> Iterator[_Frame]:
     """The pictures of all lists, each in its first list; without lists, the pictures of all folders."""
-    camera_of, seen = lru_cache(FILES_KEPT)(read_camera), set[tuple[_Place, str]]()
+    camera_of, seen = lru_cache(FILES_KEPT)(_read_camera), set[tuple[_Place, str]]()
     frames: dict[tuple[str, int], str] = {}
     for split, source, place, name in _named(root, places, problems):
         if (place, name) not in seen:
@@ -167,7 +190,7 @@ def _picture(
         raise StoreError("expected a picture below the folder; found a path that leads outside")
     file, size = picture_inside(root, f"{place.images}/{name}", *SUFFIXES)
     sequence, _, number = name.rpartition("/")
-    if place.is_tracked and not (is_name(sequence) and number.isdecimal() and int(number) < MOST_TRACKS):
+    if place.is_tracked and not (is_name(sequence) and number.isdecimal() and int(number) < _MOST_TRACKS):
         raise ValueError("expected a picture's name of a sequence and a number")
     own = sequence if place.is_tracked else name
     labels, calibrated = (file_inside(root, f"{at}/{own}.txt") for at in (place.labels, place.path_of("calib")))
@@ -203,7 +226,7 @@ def _shown(categories: Mapping[str, Category], labels_of: Of, first: int, pictur
     labels, calibrated = picture.said
     assert labels is not None
     rows = labels_of(labels, picture.is_tracked).rows.get(picture.instant, ())
-    camera = read_camera(calibrated, picture.size) if calibrated else None
+    camera = _read_camera(calibrated, picture.size) if calibrated else None
     objects = [
         _object(number if row.track is None else row.track + first, row, categories[row.kind], picture, camera)
         for number, row in enumerate((row for row in rows if not row.is_region), 1)
@@ -217,7 +240,7 @@ def _shown(categories: Mapping[str, Category], labels_of: Of, first: int, pictur
     return sample if camera is None else replace(sample, known_camera=camera, image_size=None)
 
 
-def _object(number: int, row: Row, category: Category, picture: _Frame, camera: Camera | None) -> ObjectAnnotation:
+def _object(number: int, row: _Row, category: Category, picture: _Frame, camera: Camera | None) -> ObjectAnnotation:
     """An object with its box and its pose; its `source` holds its COCO annotation."""
     x0, y0, x1, y1 = row.box
     source = {"bbox": [x0, y0, x1 - x0, y1 - y0], "area": (x1 - x0) * (y1 - y0), **row.said}
@@ -239,5 +262,126 @@ def _standing(solid: tuple[float, ...], camera: Camera | None) -> dict[str, Any]
     half = np.array([width, length, height]) / 2
     c, s = np.cos(turn), np.sin(turn)
     world_from_object = rigid([[s, -c, 0], [c, s, 0], [0, 0, 1]], [x, z, height / 2 - y])
-    camera_from_world = rigid(LEVEL, np.zeros(3)) if camera is None else rigid(camera.R, camera.t)
+    camera_from_world = rigid(_LEVEL, np.zeros(3)) if camera is None else rigid(camera.R, camera.t)
     return placed(Box3d.between(-half, half).corners, world_from_object, camera_from_world, camera and camera.intrinsics)
+
+
+@dataclass(frozen=True)
+class _Row:
+    """A line: its track (None in files of pictures); its numbers in `said`; its half-open box; its 3D box as height, width,
+    length, the middle of its bottom and its turn about y (metres, radians), None if it has no 3D box.
+    """
+
+    kind: str
+    track: int | None
+    box: Box
+    solid: tuple[float, ...] | None
+    said: Mapping[str, float | int]
+
+    @property
+    def is_region(self) -> bool:
+        """Return whether the line is a region that evaluations leave out."""
+        return self.kind == _DONT_CARE_TYPE
+
+
+@dataclass(frozen=True)
+class _Labels:
+    """A file's lines by frame (frame 0 in the file of a picture), the problems of invalid lines, and the reason why the file
+    is unusable.
+    """
+
+    rows: Mapping[int, Sequence[_Row]] = field(default_factory=dict[int, Sequence[_Row]])
+    problems: tuple[str, ...] = ()
+    unusable: str = ""
+
+
+def _read_labels(file: Path, is_tracked: bool) -> _Labels:
+    """The lines of a file."""
+    try:
+        texts = text_of(file)
+    except MISTAKES as error:
+        return _Labels(unusable=f"expected lines of labels in {file.name}; found: {one_line(error)}")
+    rows: defaultdict[int, list[_Row]] = defaultdict(list)
+    problems, tracks = list[str](), set[tuple[int, int | None]]()
+    for number, text in enumerate(texts, 1):
+        if text.strip():
+            try:
+                frame, row = _parsed(text.split(), is_tracked)
+                if is_tracked and not row.is_region and (frame, row.track) in tracks:
+                    raise ValueError(f"expected every track once in a frame; found {row.track} again")
+                tracks.add((frame, row.track))
+                rows[frame].append(row)
+            except ValueError as error:
+                problems.append(f"{file}: line {number}: {error}")
+    if (most := max(map(len, rows.values()), default=0)) > limits.MAX_IMPORTED_OBJECTS:
+        told = f"{limits.MAX_IMPORTED_OBJECTS:,} objects in a picture (limit MAX_IMPORTED_OBJECTS)"
+        return _Labels(unusable=f"expected at most {told} in {file.name}; found {most:,}")
+    return _Labels(rows, tuple(problems))
+
+
+def _parsed(words: Sequence[str], is_tracked: bool) -> tuple[int, _Row]:
+    """The frame and the row of a line's words. Raises ValueError for impossible words."""
+    begins = 2 if is_tracked else 0
+    if len(words) - begins not in (_COLUMNS, _COLUMNS + 1):
+        raise ValueError(f"expected {_COLUMNS + begins} values, or one more; found {len(words)}")
+    frame, track = (_number(word, int) for word in words[:2]) if is_tracked else (0, None)
+    if not 0 <= frame < _MOST_TRACKS or (track is not None and not -1 <= track < _MOST_TRACKS):
+        raise ValueError(f"expected numbers of a frame and a track; found {words[0]:.20} {words[1]:.20}")
+    kind, values = words[begins], [_number(word, float) for word in words[begins + 1 :]]
+    if not all(abs(value) < _FARTHEST for value in values):
+        raise ValueError(f"expected finite numbers below {_FARTHEST:,.0f}; found {' '.join(words[begins + 1 :]):.60}")
+    outside, hidden, alpha, x0, y0, x1, y1 = values[:7]
+    if kind != _DONT_CARE_TYPE and track is not None and track < 0:
+        raise ValueError(f"expected a track; found {track} of a {kind:.40}")
+    if not (outside in (-1, 0, 1, 2) if is_tracked else outside == -1 or 0 <= outside <= 1):
+        raise ValueError(f"expected truncated {'-1 to 2' if is_tracked else '-1, or 0 to 1'}; found {outside:g}")
+    if hidden not in (-1, 0, 1, 2, 3):
+        raise ValueError(f"expected occluded -1 to 3; found {hidden:g}")
+    if not (x0 <= x1 and y0 <= y1):
+        raise ValueError(f"expected left <= right, top <= bottom; found {x0:g} {y0:g} {x1:g} {y1:g}")
+    said = {"truncated": outside, "occluded": int(hidden), "alpha": alpha}
+    if len(words) - begins > _COLUMNS:
+        said["score"] = values[14]
+    if track is not None:
+        said["track_id"] = track
+    return frame, _Row(kind, track, (x0, y0, x1 + 1, y1 + 1), _solid(values[7:14]), said)
+
+
+def _number(word: str, kind: Callable[[str], Number]) -> Number:
+    try:
+        return kind(word)
+    except ValueError:
+        raise ValueError(f"expected a number; found {word!r:.60}") from None
+
+
+def _solid(values: Sequence[float]) -> tuple[float, ...] | None:
+    """A 3D box; None if all its sides are -1, the value for an unknown box."""
+    if all(side <= 0 for side in values[:3]):
+        return None
+    if not all(side > 0 for side in values[:3]):
+        raise ValueError(f"expected height, width and length above 0; found {' '.join(f'{side:g}' for side in values[:3])}")
+    return tuple(values)
+
+
+def _read_camera(file: Path, size: tuple[int, int]) -> Camera:
+    """The left colour camera of a calibration; raises ValueError for a P2 that is not a pinhole's."""
+    words = next((line.split() for line in text_of(file) if line.startswith(("P2:", "P2 "))), [])
+    try:
+        found = np.array(words[1:], np.float64)
+    except ValueError:
+        found = np.zeros(0)
+    if found.shape != (12,) or not (np.abs(found) < _FARTHEST**2).all() or not _is_pinhole(found.reshape(3, 4)):
+        raise ValueError(f"expected P2 of a pinhole, 12 numbers, in {file.name}; found {' '.join(words):.60}")
+    k = found.reshape(3, 4)
+    (fx, skew, cx, _), (_, fy, cy, _), _ = k.tolist()
+    lens = Intrinsics(width=size[0], height=size[1], fx=fx, fy=fy, cx=cx + 0.5, cy=cy + 0.5, skew=skew)
+    shift = transform(inverse(np.ascontiguousarray(k[:, :3])), k[:, 3]) + 0.0
+    if not (np.abs(shift) < _FARTHEST).all():
+        raise ValueError(f"expected P2 of a camera near the reference camera in {file.name}; found {' '.join(words):.60}")
+    return Camera(lens, _LEVEL, shift)
+
+
+def _is_pinhole(projection: NDArray[np.float64]) -> bool:
+    """Return whether the left three columns are K of a pinhole with focal lengths of at least `SHORTEST`."""
+    k = projection[:, :3]
+    return bool(min(k[0, 0], k[1, 1]) >= _SHORTEST and k[1, 0] == 0 and (k[2] == (0, 0, 1)).all())

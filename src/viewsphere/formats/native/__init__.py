@@ -23,7 +23,7 @@ from viewsphere.plugins.format import FormatSpec, Remark
 if TYPE_CHECKING:
     from collections.abc import Collection
 
-    from viewsphere.formats.native.entries import Entry
+    from viewsphere.formats.native.writing import Entry
     from viewsphere.model.sample import Sample
     from viewsphere.store import Dataset
     from viewsphere.store.foreign import ForeignDataset

@@ -40,10 +40,9 @@ from pydantic import Field
 from viewsphere.codecs.png_tiff import encode_png
 from viewsphere.errors import UserError
 from viewsphere.formats import Scope
-from viewsphere.formats.nuscenes import records
 from viewsphere.formats.nuscenes.names import LOG, MAP, alike, category_of, channels_of, modalities, token
 from viewsphere.formats.nuscenes.story import story_of
-from viewsphere.formats.nuscenes.view import KINDS, View, points
+from viewsphere.formats.nuscenes.view import KINDS, Record, View, category_record, points, visibilities
 from viewsphere.formats.shared.mounting import pointless
 from viewsphere.formats.shared.writing.paper import json_bytes
 from viewsphere.formats.shared.writing.pictures import picture
@@ -111,10 +110,10 @@ class _NuScenes(Tree):
         """The tables that belong to no scene, and the map."""
         log = {"token": LOG, "logfile": self.dataset.name, "vehicle": "", "date_captured": "", "location": ""}
         ground = {"token": MAP, "log_tokens": [LOG], "category": "semantic_prior", "filename": f"maps/{MAP}.png"}
-        tables: dict[str, list[records.Record]] = {
-            "category": [records.category(one) for one in self.dataset.categories],
+        tables: dict[str, list[Record]] = {
+            "category": [category_record(one) for one in self.dataset.categories],
             "attribute": [],
-            "visibility": records.visibilities(),
+            "visibility": visibilities(),
             "sensor": [
                 {"token": token("sensor", name), "channel": name, "modality": kind} for name, kind in self._kinds.items()
             ],
@@ -132,7 +131,7 @@ class _NuScenes(Tree):
         lists = ((start, name, b"]") for start, name in zip(starts, counts, strict=True))
         return [*chain.from_iterable(lists), b"\n}\n"]
 
-    def _items(self, rows: Iterable[tuple[str, records.Record]]) -> Iterator[Piece]:
+    def _items(self, rows: Iterable[tuple[str, Record]]) -> Iterator[Piece]:
         return (item(f"{self._version}/{table}.json", row) for table, row in rows)
 
     def _at(self, index: int) -> Sample:

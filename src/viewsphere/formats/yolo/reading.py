@@ -5,25 +5,32 @@ from __future__ import annotations
 import hashlib
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path, PurePosixPath
 from typing import Any, cast
 
 import numpy as np
 import yaml
+from numpy.typing import NDArray
 
 from viewsphere.errors import StoreError
 from viewsphere.files import read_bytes, read_text
 from viewsphere.formats.shared.reading.exif import shown_size
 from viewsphere.formats.shared.reading.image_lists import MISTAKES, TRAIN, Listed, listed_dataset, one_line, text_of, unposed
-from viewsphere.formats.yolo.lines import Kind, Row, coco_of, kind_of, parsed_line
 from viewsphere.geometry.mask import rle_of_polygons
 from viewsphere.model.sample import ObjectAnnotation, Sample
 from viewsphere.store import Category
 from viewsphere.store.foreign import ForeignDataset, foreign_object
 from viewsphere.store.paths import file_inside, is_name
 from viewsphere.urls.inside import is_inside
+
+_Float = NDArray[np.float64]
+
+_BEYOND = 0.01
+"""Share of the picture by which labels may extend beyond it, as in Ultralytics."""
+
+_MOST_POINTS = 1000
 
 NAMES = "obj.names"
 """Darknet's file of classes, a line each (https://github.com/AlexeyAB/darknet#how-to-train-to-detect-your-custom-objects)."""
@@ -54,7 +61,7 @@ def read(path: Path, *, keep_going: bool = False) -> ForeignDataset:
     told = _load(file)
     root, problems = file.parent, list[str]()
     categories = tuple(Category(number + 1, name, "") for number, name in enumerate(_names(told, file)))
-    kind = kind_of(told, file)
+    kind = _kind_of(told, file)
     pictures, most = tuple(_pictures(root, told, file, problems)), 1
     for picture in pictures:
         most = max(most, sum(1 for _ in _rows(picture, kind, len(categories), problems)))
@@ -185,7 +192,7 @@ def _picture(root: Path, split: str, name: str, file: Path, problems: list[str])
         return None
 
 
-def _rows(picture: Listed, kind: Kind, classes: int, problems: list[str]) -> Iterator[Row]:
+def _rows(picture: Listed, kind: _Kind, classes: int, problems: list[str]) -> Iterator[_Row]:
     """The valid lines of a picture's labels."""
     (labels,) = picture.said
     if labels is None:
@@ -198,21 +205,21 @@ def _rows(picture: Listed, kind: Kind, classes: int, problems: list[str]) -> Ite
     for number, text in enumerate(lines, 1):
         if text.strip():
             try:
-                yield parsed_line(text, kind, classes)
+                yield _parsed_line(text, kind, classes)
             except ValueError as error:
                 problems.append(f"{labels}: line {number}: {error}")
 
 
-def _shown(categories: Sequence[Category], kind: Kind, picture: Listed, index: int) -> Sample:
+def _shown(categories: Sequence[Category], kind: _Kind, picture: Listed, index: int) -> Sample:
     rows = _rows(picture, kind, len(categories), [])
     objects = [_object(number, row, categories, picture, kind) for number, row in enumerate(rows, 1)]
     flips = {"flip_idx": list(kind.flips)} if kind.flips else {}
     return unposed(picture, index, objects, {"file_name": picture.name, **flips})
 
 
-def _object(number: int, row: Row, categories: Sequence[Category], picture: Listed, kind: Kind) -> ObjectAnnotation:
+def _object(number: int, row: _Row, categories: Sequence[Category], picture: Listed, kind: _Kind) -> ObjectAnnotation:
     """An object with the data of its line; its `source` holds its COCO annotation."""
-    source = coco_of(row, picture.size)
+    source = _coco_of(row, picture.size)
     more: dict[str, Any] = {}
     if row.points is not None:
         seen = row.points[:, 2]
@@ -245,3 +252,102 @@ def _unsaid(root: Path) -> dict[str, Any]:
     """The splits of a folder whose data.yaml names none: the folders in `images`, or `images` itself."""
     splits = {split: f"{IMAGES}/{split}" for split in ("train", "val", "test") if (root / IMAGES / split).is_dir()}
     return splits or {TRAIN: IMAGES}
+
+
+@dataclass(frozen=True)
+class _Kind:
+    """The properties of points in data.yaml: their names (or numbers if it has no names), and their swaps in a mirror image.
+    `each` point has 2 numbers, x and y, or 3, with its visibility.
+    """
+
+    names: tuple[str, ...] = ()
+    each: int = 3
+    flips: tuple[int, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class _Row:
+    """A line: class, and, as shares of the picture, box (centre x, y, width, height), polygon (N, 2), points (N, 3)."""
+
+    number: int
+    box: tuple[float, float, float, float] | None = None
+    corners: _Float | None = None
+    points: _Float | None = None
+
+
+def _kind_of(told: Mapping[str, Any], file: Path) -> _Kind:
+    """Return the properties of points in a data.yaml; raises StoreError for invalid ones."""
+    shape, flips, names = told.get("kpt_shape"), told.get("flip_idx") or [], told.get("kpt_names") or {}
+    if shape is None:
+        return _Kind()
+    if not (_whole(shape) and len(shape) == 2 and 0 < shape[0] <= _MOST_POINTS and shape[1] in (2, 3)):
+        raise StoreError(f"{file}: expected kpt_shape [number, 2 or 3]; found {shape!r:.60}")
+    if flips and not (_whole(flips) and sorted(flips) == list(range(shape[0]))):
+        raise StoreError(f"{file}: expected flip_idx, every point's number once; found {flips!r:.60}")
+    named = cast(dict[Any, Any], names) if isinstance(names, dict) else {}
+    known = {tuple(map(str, own)) for own in named.values() if isinstance(own, list)}
+    if not all(len({*own}) == shape[0] for own in known):
+        raise StoreError(f"{file}: expected kpt_names, {shape[0]} different names for each class; found {names!r:.60}")
+    numbered = tuple(map(str, range(shape[0])))
+    return _Kind(known.pop() if len(known) == 1 else numbered, shape[1], tuple(flips))
+
+
+def _whole(values: Any) -> bool:
+    return isinstance(values, list) and all(type(value) is int for value in cast(list[Any], values))
+
+
+def _parsed_line(text: str, kind: _Kind, classes: int) -> _Row:
+    """Return the row of a line; raises ValueError for an invalid line."""
+    try:
+        number, *values = map(float, text.split())
+    except ValueError:
+        raise ValueError(f"expected numbers; found {text!r:.60}") from None
+    if number not in range(classes):
+        raise ValueError(f"expected a class from 0 to {classes - 1}; found {text.split(maxsplit=1)[0]!r:.60}")
+    found = np.array(values)
+    if not np.isfinite(found).all():
+        raise ValueError(f"expected finite numbers; found {text!r:.60}")
+    row = _row(int(number), found, kind)
+    for shares in (np.array(row.box or ()), row.corners, None if row.points is None else row.points[:, :2]):
+        if shares is not None and not ((shares >= -_BEYOND) & (shares <= 1 + _BEYOND)).all():
+            raise ValueError(f"expected shares of the picture, 0 to 1; found {text!r:.60}")
+    return row
+
+
+def _row(number: int, values: _Float, kind: _Kind) -> _Row:
+    count, pointed = len(values), 4 + len(kind.names) * kind.each
+    if count == 4 or (kind.names and count == pointed):
+        x, y, width, height = values[:4].tolist()
+        if width < 0 or height < 0:
+            raise ValueError(f"expected a width and a height from 0 on; found {width:g}, {height:g}")
+        points = values[4:].reshape(-1, kind.each) if count > 4 else None
+        if points is not None and kind.each == 2:
+            seen = np.where(points.any(axis=1), 2.0, 0.0)
+            points = np.column_stack([points, seen])
+        if points is not None and not np.isin(points[:, 2], (0, 1, 2)).all():
+            raise ValueError(f"expected points that are 0, 1 or 2; found {points[:, 2].tolist()!r:.60}")
+        return _Row(number, (x, y, width, height), None, points)
+    if kind.names:
+        raise ValueError(f"expected a class and 4 or {pointed} numbers; found {count}")
+    if count < 6 or count % 2:
+        raise ValueError(f"expected a class and 4 numbers, or x and y of three corners or more; found {count} numbers")
+    return _Row(number, None, values.reshape(-1, 2))
+
+
+def _coco_of(row: _Row, size: tuple[int, int]) -> dict[str, Any]:
+    """A line as COCO's annotation, in pixels."""
+    if row.corners is not None:
+        corners = row.corners * size
+        (x0, y0), (x1, y1) = corners.min(axis=0).tolist(), corners.max(axis=0).tolist()
+        turned = np.roll(corners, -1, axis=0)
+        area = abs(float((corners[:, 0] * turned[:, 1] - corners[:, 1] * turned[:, 0]).sum())) / 2
+        return {"bbox": [x0, y0, x1 - x0, y1 - y0], "area": area, "segmentation": [corners.ravel().tolist()]}
+    assert row.box is not None
+    x, y, width, height = (share * side for share, side in zip(row.box, size * 2, strict=True))
+    said: dict[str, Any] = {"bbox": [x - width / 2, y - height / 2, width, height], "area": width * height}
+    if row.points is not None:
+        places = np.where(row.points[:, 2:] > 0, row.points[:, :2] * size - 0.5, 0.0)  # of pixels' centres, as in COCO
+        marked = zip(places.tolist(), row.points[:, 2].tolist(), strict=True)
+        said["keypoints"] = [number for (x, y), seen in marked for number in (x, y, int(seen))]
+        said["num_keypoints"] = int((row.points[:, 2] > 0).sum())
+    return said

@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import json
 import struct
+from collections.abc import Callable
 from dataclasses import dataclass, field
+from importlib import import_module
+from importlib.util import find_spec
 from typing import Any
 from urllib.parse import unquote
 
@@ -12,17 +15,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewsphere.assets.paths.folder import ModelFolder, UnreadableError
-from viewsphere.assets.readers.gltf.compression import (
-    BASISU,
-    DRACO,
-    MESHOPT,
-    is_readable,
-    lacking,
-    meshopt_of,
-    unpacked_primitive,
-    unpacked_view,
-)
 from viewsphere.assets.readers.gltf.field import Field
+from viewsphere.errors import ModelError
+
+_DRACO = "KHR_draco_mesh_compression"
+
+_MESHOPT = ("EXT_meshopt_compression", "KHR_meshopt_compression")
+
+BASISU = "KHR_texture_basisu"
+
+_PACKAGES = {_DRACO: "DracoPy", **dict.fromkeys(_MESHOPT, "meshopt"), BASISU: "opengl_basisu"}
+
+_MODES = ("ATTRIBUTES", "TRIANGLES", "INDICES")
+
+_FILTERS = ("NONE", "OCTAHEDRAL", "QUATERNION", "EXPONENTIAL", "COLOR")
 
 COMPONENTS: dict[int, type[np.generic]] = {
     5120: np.int8,
@@ -36,8 +42,8 @@ WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT2": 4, "MAT3": 9, "M
 
 READ_EXTENSIONS = {
     BASISU,
-    DRACO,
-    *MESHOPT,
+    _DRACO,
+    *_MESHOPT,
     "EXT_mesh_gpu_instancing",
     "EXT_texture_webp",
     "KHR_materials_clearcoat",
@@ -131,11 +137,11 @@ class Document:
         """Plain bytes of a bufferView and its stride."""
         entry = self.root.item("bufferViews", index)
         stride = entry.integer("byteStride", 0) or None
-        packed = meshopt_of(entry)
+        packed = _meshopt_of(entry)
         if packed is None or (not is_readable(packed[0]) and self._has_plain_copy(entry)):
             return self.slice(entry), stride
         if index not in self._views:
-            self._views[index] = unpacked_view(self.folder, *packed, self.slice)
+            self._views[index] = _unpacked_view(self.folder, *packed, self.slice)
         return memoryview(self._views[index]), stride
 
     def _has_plain_copy(self, entry: Field) -> bool:
@@ -154,17 +160,17 @@ class Document:
 
     def unpack(self, primitive: Field) -> bool:
         """Decode a primitive's Draco data, from which `accessor` then serves its elements; False for plain data."""
-        packed = primitive.extension(DRACO)
+        packed = primitive.extension(_DRACO)
         if packed is None:
             return False
-        if is_readable(DRACO):
+        if is_readable(_DRACO):
             position = primitive.get("attributes").integer("POSITION")
             if position not in self._elements:
                 data, _ = self.view(packed.integer("bufferView"))
-                self._elements |= unpacked_primitive(self.folder, primitive, packed, data)
+                self._elements |= _unpacked_primitive(self.folder, primitive, packed, data)
             return True
-        if DRACO in {entry.value for entry in self.root.items("extensionsRequired")}:
-            raise lacking(self.folder, DRACO)
+        if _DRACO in {entry.value for entry in self.root.items("extensionsRequired")}:
+            raise lacking(self.folder, _DRACO)
         return False
 
     def accessor(self, index: int, widths: tuple[int, ...]) -> NDArray[Any]:
@@ -259,3 +265,81 @@ def _chunks(folder: ModelFolder, data: bytes) -> tuple[bytes, bytes | None]:
     if b"JSON" not in chunks:
         raise folder.error("expected a GLB with a JSON chunk, found none")
     return chunks[b"JSON"], chunks.get(b"BIN\0")
+
+
+def is_readable(extension: str) -> bool:
+    """Return whether the package that decodes an extension's data is installed."""
+    return find_spec(_PACKAGES[extension]) is not None
+
+
+def lacking(folder: ModelFolder, extension: str) -> ModelError:
+    """The error for a file whose data needs a package that is not installed."""
+    return folder.error(
+        f"{extension} needs the package {_PACKAGES[extension]}, which is not installed: pip install 'viewsphere[gltf]', or "
+        "export the model without compression"
+    )
+
+
+def _meshopt_of(view: Field) -> tuple[str, Field] | None:
+    """The extension that compresses a bufferView, and its fields; None for plain data."""
+    for name in _MESHOPT:
+        fields = view.extension(name)
+        if fields is not None:
+            return name, fields
+    return None
+
+
+def _unpacked_view(folder: ModelFolder, extension: str, fields: Field, slice_of: Callable[[Field], memoryview]) -> bytes:
+    """The plain bytes of a bufferView compressed by meshoptimizer; `slice_of` returns the packed bytes that fields name.
+
+    https://github.com/KhronosGroup/glTF/tree/main/extensions: EXT_meshopt_compression.
+    """
+    if not is_readable(extension):
+        raise lacking(folder, extension)
+    count, stride = fields.integer("count"), fields.integer("byteStride")
+    mode, kind = fields.text("mode"), fields.text("filter", "NONE")
+    if mode not in _MODES or kind not in _FILTERS:
+        raise fields.fail(f"a mode of {', '.join(_MODES)} and a filter of {', '.join(_FILTERS)}")
+    folder.check("MAX_VERTICES", count, f"elements in {fields.where.rpartition('.')[2]}")
+    data = slice_of(fields)
+    try:
+        decoded: NDArray[Any] = import_module("meshopt").decode_gltf_buffer(bytes(data), count, stride, mode, kind)
+    except MemoryError:
+        raise
+    except Exception as error:  # the package's own kinds of errors, too
+        raise _damaged(folder, fields, extension, error) from None
+    if mode == "ATTRIBUTES":
+        return decoded.tobytes()
+    return decoded.astype("<u2" if stride == 2 else "<u4").tobytes()
+
+
+def _unpacked_primitive(folder: ModelFolder, primitive: Field, fields: Field, data: memoryview) -> dict[int, NDArray[Any]]:
+    """The elements of each accessor of a primitive compressed by Draco, by the accessor's number.
+
+    https://github.com/KhronosGroup/glTF/tree/main/extensions: KHR_draco_mesh_compression.
+    """
+    try:
+        mesh = import_module("DracoPy").decode(bytes(data))
+        by_id = {attribute["unique_id"]: np.asarray(attribute["data"]) for attribute in mesh.attributes}
+        faces = np.asarray(mesh.faces)
+    except MemoryError:
+        raise
+    except Exception as error:  # the package's own kinds of errors, too
+        raise _damaged(folder, fields, _DRACO, error) from None
+    attributes = primitive.get("attributes")
+    elements: dict[int, NDArray[Any]] = {}
+    for name in fields.get("attributes").mapping():
+        values = by_id.get(fields.get("attributes").integer(name))
+        if values is None:
+            raise fields.fail(f"attribute {name} among the decoded ones")
+        if name in attributes:
+            elements[attributes.integer(name)] = values.reshape(len(values), -1)
+    if "indices" in primitive:
+        elements[primitive.integer("indices")] = faces.reshape(-1, 1).astype(np.uint32)
+    return elements
+
+
+def _damaged(folder: ModelFolder, fields: Field, extension: str, error: Exception) -> ModelError:
+    """The error for compressed data that its package cannot decode."""
+    reason = " ".join(str(error).split())[:100]
+    return folder.error(f"{fields.where.rpartition('.')[0]}: {extension} cannot be decoded ({reason}): truncated or damaged")

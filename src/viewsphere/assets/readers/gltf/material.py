@@ -8,8 +8,7 @@ from typing import Any, Literal
 from urllib.parse import unquote
 
 from viewsphere.assets.mesh import HIGHEST_IOR, Material, Texture, Wrap
-from viewsphere.assets.readers.gltf.compression import BASISU, is_readable, lacking
-from viewsphere.assets.readers.gltf.document import Document
+from viewsphere.assets.readers.gltf.document import BASISU, Document, is_readable, lacking
 from viewsphere.assets.readers.gltf.field import Field
 from viewsphere.assets.readers.gltf.specular_glossiness import SpecularGlossiness, as_metallic_roughness
 
