@@ -20,9 +20,7 @@ from viewsphere.assets.animation.clip import Timeline
 from viewsphere.assets.metadata.sidecars import said_of
 from viewsphere.composing.composition import BoxOf, Numbering, compose
 from viewsphere.composing.filling import filled
-from viewsphere.composing.motion import check_motions
 from viewsphere.composing.redraws import scene_draws
-from viewsphere.composing.scene.draws import check_night, is_night
 from viewsphere.composing.scene.pictures import check_pictures, proportions, scene_pictures
 from viewsphere.composing.seeds import Names, share
 from viewsphere.composing.time_steps import check_keys, timed
@@ -39,22 +37,15 @@ from viewsphere.model.thing import Motion, Thing
 from viewsphere.planning.checks.lenses import check_fill, check_lenses
 from viewsphere.planning.checks.models import (
     check_all_frames,
-    check_blend,
-    check_catcher,
     check_distractors,
     check_frames,
-    check_listed,
-    check_materials,
-    check_names,
-    check_photo,
-    check_redraws,
-    check_shutter,
+    check_recipe,
     check_sizes,
-    check_splits,
+    check_specs,
 )
 from viewsphere.planning.checks.panoramas import check_panoramas
 from viewsphere.planning.checks.sequences import check_sequences
-from viewsphere.planning.checks.warnings import hidden_background, hidden_by_exposure, no_light, out_of_view, too_small
+from viewsphere.planning.checks.warnings import doubtful_views, unlit
 from viewsphere.planning.clips import with_clips
 from viewsphere.planning.credits import credits_of, unlicensed
 from viewsphere.planning.engine_digest import engine_options, script_digest
@@ -65,11 +56,9 @@ from viewsphere.planning.splits import expected, quotas
 from viewsphere.planning.tracks import tracks_digest, tracks_of
 from viewsphere.plugins.engine import EngineSpec
 from viewsphere.plugins.sampler import SamplerSpec
-from viewsphere.recipe.draws import alternatives, span
+from viewsphere.recipe.draws import span
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.recipe.world.finish import JitterEntry
-from viewsphere.recipe.world.light import NightSky
-from viewsphere.recipe.world.scene import SceneEntry
 from viewsphere.store import Block, Category, Row
 from viewsphere.store.index import Index, Ranges, length, numbers, under, without
 
@@ -189,13 +178,11 @@ class Plan(Shown, SamplingContext):
             warnings.append(
                 f"elevations go down to {lowest:g}: from below, the ground hides the models; set scene.ground: off to see them"
             )
-        doubts: Iterator[str] = out_of_view(self.recipe, self.pose_list, self.intrinsics)
         for name, recipe in self.recipe.conditions.items():
             warnings += (
-                message.replace("scene", f"variations.{name}", 1) if name else message for message in _unlit(recipe.scene)
+                message.replace("scene", f"variations.{name}", 1) if name else message for message in unlit(recipe.scene)
             )
-        doubts = chain(doubts, hidden_background(scene, self.pose_list, self.intrinsics))
-        doubts = chain(doubts, too_small(self.recipe, self.pose_list, self.intrinsics))
+        doubts = doubtful_views(self.recipe, self.pose_list, self.intrinsics)
         if self.blend is not None:
             warnings += self.blend.warnings
         warnings += left_out(self.recipe)
@@ -431,14 +418,6 @@ def _by_name(spec: ModelSpec) -> dict[str, Any]:
     return spec.model_dump(mode="json") | {"source": Path(spec.source).name}
 
 
-def _unlit(scene: SceneEntry) -> Iterator[str]:
-    """Yield warnings about settings that make a scene's pictures black, or white."""
-    dark = not all(isinstance(sky, NightSky) for sky in alternatives(scene.sky))
-    if dark and any(is_night(sun) for sun in alternatives(scene.sun)):
-        yield "scene.sun: at this date, time and place the sun is below the horizon: there is none, and no daylight"
-    yield from chain(no_light(scene), hidden_by_exposure(scene))
-
-
 def plan(recipe: Recipe | str | PathLike[str], shot_frames: int | None = None) -> Plan:
     """Return the plan of a recipe, frame by frame, without reading a mesh.
 
@@ -454,16 +433,7 @@ def plan(recipe: Recipe | str | PathLike[str], shot_frames: int | None = None) -
     """
     recipe = Recipe.ensure(recipe)
     with recipe.located():
-        check_names(recipe)
-        check_blend(recipe)
-        for condition in recipe.conditions.values():
-            check_catcher(condition)
-            check_shutter(condition)
-            check_photo(condition)
-            check_night(condition)
-        check_splits(recipe)
-        check_redraws(recipe)
-        check_motions(recipe)
+        check_recipe(recipe)
         views = poses_of(recipe.viewpoints, recipe.time, recipe.seed, recipe.folder)
         own = lens(recipe, views)
         rig = rig_of(recipe, own)
@@ -479,8 +449,7 @@ def plan(recipe: Recipe | str | PathLike[str], shot_frames: int | None = None) -
         lines: tuple[Timeline | None, ...] = (None,) * len(specs)
         if recipe.time is not None:
             specs, lines = with_clips(recipe, numbered)
-        check_listed(recipe, specs)
-        check_materials(recipe, specs)
+        check_specs(recipe, specs)
         most = recipe.shot_frames or shot_frames or SHOT_FRAMES
         frames = 1 if recipe.is_new_each_frame and recipe.time is None else most
         timings = timings if any(timings) else ()

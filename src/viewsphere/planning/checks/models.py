@@ -11,7 +11,9 @@ from pydantic import JsonValue
 
 from viewsphere import plugins
 from viewsphere.composing.layouts import check_layout, check_orientation
+from viewsphere.composing.motion import check_motions
 from viewsphere.composing.redraws import redraws_frames
+from viewsphere.composing.scene.draws import check_night
 from viewsphere.composing.viewpoints.poses import Poses
 from viewsphere.errors import RecipeError
 from viewsphere.labels import channels, is_channel, is_on_request, label_named, labels, on_request
@@ -31,7 +33,27 @@ from viewsphere.validation.errors import nearest, one_of, read_options, shown
 from viewsphere.validation.suggestions import suggestion
 
 
-def check_redraws(recipe: Recipe) -> None:
+def check_recipe(recipe: Recipe) -> None:
+    """Check everything that the recipe alone decides: names, the scene of each condition, splits, redraws and motions."""
+    _check_names(recipe)
+    _check_blend(recipe)
+    for condition in recipe.conditions.values():
+        _check_catcher(condition)
+        _check_shutter(condition)
+        _check_photo(condition)
+        check_night(condition)
+    _check_splits(recipe)
+    _check_redraws(recipe)
+    check_motions(recipe)
+
+
+def check_specs(recipe: Recipe, specs: tuple[ModelSpec, ...]) -> None:
+    """Check that the models allow the recipe's listed scenes and its materials."""
+    _check_listed(recipe, specs)
+    _check_materials(recipe, specs)
+
+
+def _check_redraws(recipe: Recipe) -> None:
     """Check that a recipe that redraws for visibility has values to redraw, and that only still pictures may be empty."""
     for name in ("min_visibility", "wanted", "empty") if recipe.time is not None else ():
         if getattr(recipe, name) is not None:
@@ -64,7 +86,7 @@ def check_distractors(recipe: Recipe) -> None:
         raise RecipeError("scenes.distractors: expected models with labels: background; found none")
 
 
-def check_names(recipe: Recipe) -> None:
+def _check_names(recipe: Recipe) -> None:
     """Check that the engine, the formats, the sampler, the placer and the channels are known, and work with still pictures if
     the recipe has no time.
     """
@@ -170,7 +192,7 @@ def _check_painted(recipe: Recipe, where: str, name: str) -> None:
         )
 
 
-def check_blend(recipe: Recipe) -> None:
+def _check_blend(recipe: Recipe) -> None:
     """Check that the engine renders .blend files, if the scene is one."""
     if recipe.scene.blend is not None and not _engine(recipe).opens_scenes:
         raise RecipeError(
@@ -179,7 +201,7 @@ def check_blend(recipe: Recipe) -> None:
         )
 
 
-def check_catcher(recipe: Recipe) -> None:
+def _check_catcher(recipe: Recipe) -> None:
     """Check that the engine supports shadow catchers, if the ground may be one."""
     scene = recipe.scene
     grounds = [scene.automatic_ground if ground == "auto" else ground for ground in alternatives(scene.ground)]
@@ -229,7 +251,7 @@ def check_all_frames(recipe: Recipe, frames: int, factors: str) -> None:
         )
 
 
-def check_listed(recipe: Recipe, specs: tuple[ModelSpec, ...]) -> None:
+def _check_listed(recipe: Recipe, specs: tuple[ModelSpec, ...]) -> None:
     """Check that models listed in splits exist and are listed once; if no split has a share, all models must be listed."""
     keys, seen = {spec.key for spec in specs}, dict[str, str]()
     for name, listed in recipe.splits.shares.items():
@@ -245,7 +267,7 @@ def check_listed(recipe: Recipe, specs: tuple[ModelSpec, ...]) -> None:
         raise RecipeError(f"splits: expected every model to be listed; found no split for {min(keys - seen.keys())!r}")
 
 
-def check_photo(recipe: Recipe) -> None:
+def _check_photo(recipe: Recipe) -> None:
     """Refuse fog and night with a photograph as the background, which has its own weather and hour."""
     scene = recipe.scene
     if not any(entry.image is not None or entry.images is not None for entry in scene.backgrounds):
@@ -260,7 +282,7 @@ def check_photo(recipe: Recipe) -> None:
         )
 
 
-def check_shutter(recipe: Recipe) -> None:
+def _check_shutter(recipe: Recipe) -> None:
     """Refuse a recipe that blurs moving things twice: by an open shutter, and by an effect."""
     if recipe.time is None or not recipe.time.shutter:
         return
@@ -272,7 +294,7 @@ def check_shutter(recipe: Recipe) -> None:
             )
 
 
-def check_splits(recipe: Recipe) -> None:
+def _check_splits(recipe: Recipe) -> None:
     """Check that a recipe with splits by place has a place."""
     if recipe.splits.by == "place" and recipe.scene.place is None:
         raise RecipeError(
@@ -280,7 +302,7 @@ def check_splits(recipe: Recipe) -> None:
         )
 
 
-def check_materials(recipe: Recipe, specs: tuple[ModelSpec, ...]) -> None:
+def _check_materials(recipe: Recipe, specs: tuple[ModelSpec, ...]) -> None:
     """Check that every change of materials matches some model."""
     for i, entry in enumerate(recipe.scene.materials):
         if not any(fnmatchcase(spec.key, entry.models) for spec in specs):

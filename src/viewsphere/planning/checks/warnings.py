@@ -51,7 +51,23 @@ SMALLEST = 12
 TOO_SMALL = f"which for most detectors is too small (under {SMALLEST})"
 
 
-def no_light(scene: SceneEntry) -> Iterator[str]:
+def unlit(scene: SceneEntry) -> Iterator[str]:
+    """Yield warnings about settings that make a scene's pictures black, or white."""
+    dark = not all(isinstance(sky, NightSky) for sky in alternatives(scene.sky))
+    if dark and any(is_night(sun) for sun in alternatives(scene.sun)):
+        yield "scene.sun: at this date, time and place the sun is below the horizon: there is none, and no daylight"
+    yield from _no_light(scene)
+    yield from _hidden_by_exposure(scene)
+
+
+def doubtful_views(recipe: Recipe, views: Poses, lens: Intrinsics) -> Iterator[str]:
+    """Yield warnings about viewpoints from which models are out of view or too small, or the background is hidden."""
+    yield from _out_of_view(recipe, views, lens)
+    yield from _hidden_background(recipe.scene, views, lens)
+    yield from _too_small(recipe, views, lens)
+
+
+def _no_light(scene: SceneEntry) -> Iterator[str]:
     """A warning if there is no light at all, or none in some of the scenes that may be drawn."""
     dark = [] if scene.blend is not None else [high == 0 for _, high in _lights(scene)]
     if any(dark):
@@ -62,7 +78,7 @@ def no_light(scene: SceneEntry) -> Iterator[str]:
         )
 
 
-def hidden_by_exposure(scene: SceneEntry) -> Iterator[str]:
+def _hidden_by_exposure(scene: SceneEntry) -> Iterator[str]:
     """A warning for an exposure that turns white into black, or black into white."""
     lit = [light for light in _lights(scene) if light[1] > 0]
     if not lit or scene.blend is not None or scene.view.exposure == "auto":
@@ -74,7 +90,7 @@ def hidden_by_exposure(scene: SceneEntry) -> Iterator[str]:
         yield f"scene.view.exposure: at {high:g} stops black is white, and so is the picture; lower it, or the lights' strength"
 
 
-def out_of_view(recipe: Recipe, views: Poses, lens: Intrinsics) -> Iterator[str]:
+def _out_of_view(recipe: Recipe, views: Poses, lens: Intrinsics) -> Iterator[str]:
     """A warning if the models' centre is in no picture, or if jitter moves it out of some; random scenes are not checked.
 
     The models' sizes are not known yet: near ones may still be visible.
@@ -109,7 +125,7 @@ def out_of_view(recipe: Recipe, views: Poses, lens: Intrinsics) -> Iterator[str]
         )
 
 
-def hidden_background(scene: SceneEntry, views: Poses, lens: Intrinsics) -> Iterator[str]:
+def _hidden_background(scene: SceneEntry, views: Poses, lens: Intrinsics) -> Iterator[str]:
     """A warning if an endless ground hides most of the background photographs, on average over the poses."""
     pictures = [entry for entry in scene.backgrounds if entry.image is not None or entry.images is not None]
     if not pictures or not scene.always_has_ground or lens.lens.is_parallel:
@@ -123,7 +139,7 @@ def hidden_background(scene: SceneEntry, views: Poses, lens: Intrinsics) -> Iter
         )
 
 
-def too_small(recipe: Recipe, views: Poses, lens: Intrinsics) -> Iterator[str]:
+def _too_small(recipe: Recipe, views: Poses, lens: Intrinsics) -> Iterator[str]:
     """A warning for each entry whose models are smaller than `SMALLEST` pixels at the farthest viewpoint, if the recipe gives
     their length or the share of the picture that they fill.
     """
