@@ -1,6 +1,6 @@
 """Who stands beside whom."""
 
-from viewsphere.composing.cast import companions
+from viewsphere.composing.composition import companions
 from viewsphere.model.model_spec import ModelSpec
 
 

@@ -9,7 +9,6 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from viewsphere.assets.animation.skin import joined
 from viewsphere.assets.appearance.shown import shown_texels
 from viewsphere.assets.mesh import Image, Material, Mesh, Texture
 from viewsphere.assets.paths.folder import ModelFolder
@@ -138,7 +137,7 @@ def assemble(
     sizes = [len(piece.triangles) for piece in pieces]
     part = np.repeat([part_of[piece.part] for piece in pieces], sizes)
     material = np.repeat([piece.material for piece in pieces], sizes)
-    body_parts, body_part = joined([(p.bones, p.bone, size) for p, size in zip(pieces, sizes, strict=True)])
+    body_parts, body_part = _joined([(p.bones, p.bone, size) for p, size in zip(pieces, sizes, strict=True)])
 
     for piece in pieces:
         check_coordinates(folder, piece.positions, piece.triangles, f"part {piece.part!r}: " if piece.part else "")
@@ -340,3 +339,19 @@ def _texels(mesh: Mesh, index: int) -> float:
         corners = uv[mesh.triangles[mesh.triangle_material == index]].astype(np.float64)
         alpha = alpha[shown_texels(texture, corners, alpha.shape)]
     return float(alpha.max(initial=0)) / 255.0
+
+
+def _joined(pieces: Sequence[tuple[tuple[str, ...], Int | None, int]]) -> tuple[tuple[str, ...], NDArray[np.int32] | None]:
+    """The names of all bones of some pieces, each once, and the bone number of each triangle, from 1, 0 for none; None if no
+    piece has bones. Each piece gives the names of its bones, the bone of each triangle (None: no bones), and its number of
+    triangles.
+    """
+    names = tuple(dict.fromkeys(name for own, _, _ in pieces for name in own))
+    if not names:
+        return (), None
+    number = {name: i for i, name in enumerate(names, 1)}
+    parts = [
+        np.zeros(count, np.int32) if bone is None else np.array([*(number[name] for name in own), 0], np.int32)[bone]
+        for own, bone, count in pieces
+    ]
+    return names, np.concatenate(parts)

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import re
 import sys
+from collections.abc import Sequence
 from contextlib import ExitStack, nullcontext, redirect_stdout
 from dataclasses import asdict
 from pathlib import Path
@@ -37,7 +39,7 @@ from viewsphere.cli.terminal import (
 )
 from viewsphere.errors import StoreError, UserError
 from viewsphere.kernels.garbage import importing
-from viewsphere.recipe.starts import FIRST, FoundFiles, kinds, start, with_models
+from viewsphere.recipe.starts import BY_FRAME, FEWEST, FIRST, REPEAT, FoundFiles, kinds, start
 from viewsphere.run.workers.worker_count import cores
 from viewsphere.scratch import write_whole
 from viewsphere.validation.quantity import quantity
@@ -105,7 +107,7 @@ def _new_start(folder: Path, kind: str) -> None:
     models = _models_in(file.parent)
     files = {file if name == "recipe.yaml" else file.parent / name: text for name, text in start(kind).items()}
     if models:
-        files[file] = with_models(files[file], file.parent.absolute().name, models)
+        files[file] = _with_models(files[file], file.parent.absolute().name, models)
     for path in files:
         if path.exists():
             raise UserError(f"{path}: expected a new file, found one that exists: choose another folder")
@@ -467,3 +469,35 @@ def _compile_kernels(recipe: Recipe | None = None) -> None:
     plain = {"models": [{"source": model_for("example")}], "viewpoints": {"azimuth": [0], "elevation": [20], "distance": 4}}
     with ProgressBar(quiet=False) as bar:
         precompile_for(recipe or Recipe.model_validate(plain), told_to(bar.show))
+
+
+def _with_models(text: str, name: str, found: Sequence[FoundFiles]) -> str:
+    """The text of a starting recipe, named `name`, with these files instead of the zoo's models."""
+    entries = "".join(
+        f"  - source: {_quoted(one.pattern)}    # {quantity(one.number, 'file')}\n    category: {_quoted(one.category)}\n"
+        for one in found
+    )
+    hints = (
+        "    # unit: mm                 # m, cm, mm, in, ft or the metres in one unit\n"
+        "    # up: +z                   # the axis that points up ...\n"
+        "    # forward: -y              # ... and the one that the front faces; viewsphere inspect FILE shows both\n"
+    )
+    text = re.sub(r"^name: \S+", lambda _: f"name: {_quoted(name)}", text, count=1, flags=re.MULTILINE)
+    models = f"models:\n{entries}{hints}".rstrip("\n")
+    text = re.sub(r"^models:.*?(?=\n\n)", lambda _: models, text, count=1, flags=re.DOTALL | re.MULTILINE)
+    text = re.sub(r"^(viewpoints:)  .*$", r"\1", text, count=1, flags=re.MULTILINE)
+    fill = "  distance: {fill: 0.6}        # the share of the picture that the model takes; or metres"
+    text = re.sub(r"^  distance: [\d[].*$", fill, text, count=1, flags=re.MULTILINE)
+    few = sum(one.number for one in found) < FEWEST
+    if few:
+        text = re.sub(r"^splits: \{by: model.*$", BY_FRAME, text, count=1, flags=re.MULTILINE)
+        text = re.sub(r"^(  objects: .*)$", rf"\1\n{REPEAT}", text, count=1, flags=re.MULTILINE)
+    return text
+
+
+def _quoted(text: str) -> str:
+    """The text as YAML in a line, in quotes where it needs them."""
+    import yaml
+
+    plain = re.fullmatch(r"[A-Za-z_][\w ./-]*", text) and yaml.safe_load(text) == text
+    return text if plain else yaml.safe_dump(text, default_style='"', width=10_000).strip()

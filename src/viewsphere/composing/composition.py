@@ -2,21 +2,25 @@
 
 from __future__ import annotations
 
+import math
 from collections import defaultdict
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache, partial
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from viewsphere.composing.cast import companions
 from viewsphere.composing.filling import shape_of
 from viewsphere.composing.layouts import BoxOf, Laid, Remembering, laid, remembered_as, shape, unremembered
 from viewsphere.composing.placing import Footprint, Obstacles, Room, footprint, obstacles, standing
 from viewsphere.composing.redraws import SAME_MODELS, fewer, least_objects, redraw_names, redraws_place
 from viewsphere.composing.scene.blend_scene import BlendScenery
+from viewsphere.composing.scene.pictures import IMAGE_SUFFIXES, files_in, proportions
 from viewsphere.composing.scene.scenery import (
+    TRIES,
+    Naming,
     SceneryPiece,
     composed,
     draw_names,
@@ -27,16 +31,15 @@ from viewsphere.composing.scene.scenery import (
     place_pavements,
     place_pieces,
     place_surfaces,
-    plane_images,
-    plane_pieces,
-    plane_spec,
+    scenery_key,
 )
-from viewsphere.composing.seeds import Names, generator, scene_generators
+from viewsphere.composing.seeds import Names, generator, scene_generators, share
 from viewsphere.composing.sendable import Sendable
 from viewsphere.composing.time_steps import Schedule, TimedPoses
 from viewsphere.composing.viewpoints.poses import Poses
 from viewsphere.composing.viewpoints.sequence_poses import SequencePoses
 from viewsphere.errors import RecipeError
+from viewsphere.geometry.box3d import Box3d
 from viewsphere.geometry.rotation import transform
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.place import Bay, Lane, Surface
@@ -44,7 +47,7 @@ from viewsphere.model.scene import IDENTITY, Matrix4, Vector
 from viewsphere.model.thing import Motion, Thing
 from viewsphere.recipe.draws import drawn
 from viewsphere.recipe.recipe import Recipe
-from viewsphere.recipe.world.scenery import Labels
+from viewsphere.recipe.world.scenery import Labels, PlaneEntry
 from viewsphere.store import Category
 
 __all__ = ["BoxOf", "Composition", "Moved", "Numbering", "center", "center_of_all", "compose", "still"]
@@ -124,7 +127,7 @@ class Composition(Sendable):
             yield from self.blend.models(self._category_id)
         for entry, files in zip(self.recipe.scene.planes, self.images, strict=True):
             if entry.labels == "own":
-                yield from (plane_spec(self.recipe, entry, file, self._category_id) for file in files)
+                yield from (_plane_spec(self.recipe, entry, file, self._category_id) for file in files)
 
     @cached_property
     def most_scenery(self) -> int:
@@ -280,7 +283,7 @@ class Composition(Sendable):
             pieces += self.blend.pieces(subject, pose, self._category_id)
         prints = [footprint(box_of(t.model), t.world_from_object) for t in targets]
         return pieces + list(
-            plane_pieces(self.recipe, self.images, subject, pose, prints, self._category_id, redraw_names(redraw))
+            _plane_pieces(self.recipe, self.images, subject, pose, prints, self._category_id, redraw_names(redraw))
         )
 
     @cached_property
@@ -362,7 +365,7 @@ def compose(
         recipe,
         subjects,
         {spec.key: tuple(members[split]) for spec, split in zip(specs, splits, strict=True)},
-        plane_images(recipe),
+        _plane_images(recipe),
         own,
         _blend(recipe, numbering),
     )
@@ -430,3 +433,104 @@ def _blend(recipe: Recipe, numbering: Numbering) -> BlendScenery | None:
     scenery = BlendScenery(recipe, entry, numbering, dict(sorted(seconds.items())))
     scenery.check()
     return scenery
+
+
+def _plane_images(recipe: Recipe) -> tuple[tuple[str, ...], ...]:
+    """Absolute paths of the pictures of each entry of planes, sorted; raises RecipeError if there are none."""
+    images: list[tuple[str, ...]] = []
+    for i, entry in enumerate(recipe.scene.planes):
+        if entry.image is not None:
+            path = recipe.folder / Path(entry.image).expanduser()
+            files = (path.as_posix(),) if path.is_file() else ()
+            problem = f"scene.planes[{i}].image: expected an image file; found none at {path}"
+        else:
+            folder = recipe.folder / Path(entry.images or "").expanduser()
+            files = files_in(folder)
+            endings = ", ".join(IMAGE_SUFFIXES)
+            problem = f"scene.planes[{i}].images: expected a folder with images ({endings}); found none in {folder}"
+        if not files:
+            raise RecipeError(problem)
+        images.append(files)
+    return tuple(images)
+
+
+def _plane_pieces(
+    recipe: Recipe,
+    images: Sequence[Sequence[str]],
+    model: str,
+    pose: str | None,
+    targets: Sequence[Footprint],
+    category_id: Naming,
+    redraw: Names = (),
+) -> Iterator[SceneryPiece]:
+    """The planes of one model, or of one frame, clear of the targets and of one another; `redraw` names another draw.
+
+    Raises RecipeError if that cannot be.
+    """
+    standing_there = list(targets)
+    for i, entry in enumerate(recipe.scene.planes):
+        names = (*draw_names(entry.draw, model, pose), *redraw)
+        count = drawn(entry.count, scene_generators(recipe.seed, names), ("planes", str(i), "count"))
+        for j in range(count):
+            purpose = (*names, str(i), str(j))
+            if share(recipe.seed, "plane shown", *purpose) >= entry.share:
+                continue
+            rng = generator(recipe.seed, "plane", *purpose)
+            path = images[i][int(rng.integers(len(images[i])))]
+            half = entry.height * proportions(path) / 2
+            box = Box3d.between((-half, 0.0, 0.0), (half, 0.0, entry.height)).corners
+            move = _plane_spot(f"scene.planes[{i}]", entry, rng, box, standing_there)
+            standing_there.append(footprint(box, move))
+            yield SceneryPiece(_plane_spec(recipe, entry, path, category_id), move, entry.labels)
+
+
+def _plane_spot(
+    where: str, entry: PlaneEntry, rng: np.random.Generator, box: NDArray[np.float64], others: Sequence[Footprint]
+) -> Matrix4:
+    if entry.at is not None:
+        move = standing(box, *entry.at)
+        if not all(footprint(box, move).apart(other, 0.0) for other in others):
+            raise RecipeError(
+                f"{where}.at: expected the plane clear of the models and of other planes; found it in one: move it"
+            )
+        return move
+    assert entry.around is not None
+    (near, far), (low, high) = entry.around.distance, entry.around.azimuth
+    for _ in range(TRIES):
+        distance, azimuth = near + rng.random() * (far - near), low + rng.random() * (high - low)
+        x, y = distance * math.sin(math.radians(azimuth)), -distance * math.cos(math.radians(azimuth))
+        move = standing(box, x, y, azimuth + 180.0)
+        if all(footprint(box, move).apart(other, 0.0) for other in others):
+            return move
+    raise RecipeError(
+        f"{where}.around: expected room for the plane clear of the models and of other planes; found none: "
+        "ask for fewer, or for a larger distance"
+    )
+
+
+def _plane_spec(recipe: Recipe, entry: PlaneEntry, path: str, category_id: Naming) -> ModelSpec:
+    """The model of a plane with this picture."""
+    file = Path(path)
+    inside = file.relative_to(recipe.folder) if file.is_relative_to(recipe.folder) else file.name
+    return ModelSpec(
+        key=scenery_key(file.stem, f"{inside} {entry.height!r}"),
+        source=path,
+        category=entry.category,
+        category_id=category_id(entry.category, entry.labels),
+        unit=entry.height,
+        centring="floor",
+    )
+
+
+def companions(seed: int, spec: ModelSpec, others: Iterable[ModelSpec], count: int, names: Names) -> tuple[ModelSpec, ...]:
+    """`count` models of `others` as company of a model, which is not among them.
+
+    Each place goes to the model with the lowest hash for it (rendezvous hashing): another model in the recipe changes only the
+    places that it gets.
+    """
+    left = {other.key: other for other in others if other.key != spec.key}
+    chosen: list[ModelSpec] = []
+    for slot in range(count):
+        key = min(left, key=lambda k: (share(seed, "company", *names, str(slot), k), k))
+        chosen.append(left.pop(key))
+    return tuple(chosen)

@@ -39,12 +39,13 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
+from viewsphere.codecs.png_tiff import encode_png
 from viewsphere.formats import Scope
 from viewsphere.formats.shared.kitti import printed, projection, rectified
 from viewsphere.formats.shared.writing import refusals
 from viewsphere.formats.shared.writing.export_files import Coded
-from viewsphere.formats.shared.writing.flow_files import flow_png, steps_png
-from viewsphere.formats.shared.writing.pictures import ids_png, picture
+from viewsphere.formats.shared.writing.flow_files import STEPS, ZERO, steps_png
+from viewsphere.formats.shared.writing.pictures import picture
 from viewsphere.formats.shared.writing.sequences import Eyes, check_whole, instants, number, two_eyes
 from viewsphere.formats.shared.writing.tree import File, Tree, functions
 from viewsphere.model.fields.frozen import Frozen
@@ -110,7 +111,7 @@ class KittiFlow(Tree):
             if self._has_motion:
                 yield f"disp_{kind}_1", _made(sample, f"disparity then {kind}", partial(_later, sample, kind == "noc"))
         if self._has_motion:
-            yield "obj_map", ids_png(sample)
+            yield "obj_map", _ids_png(sample)
 
     def _calibration(self, sample: Sample, root: str, name: str) -> File:
         baseline = self._eyes.pair(sample).baseline
@@ -126,7 +127,7 @@ def _made(sample: Sample, name: str, make: Callable[[], bytes]) -> Coded:
 
 
 def _flow(sample: Sample, states: tuple[int, ...]) -> bytes:
-    return flow_png(sample.channels["flow"], np.isin(sample.channels["flow_state"], states))
+    return _flow_png(sample.channels["flow"], np.isin(sample.channels["flow_state"], states))
 
 
 def _disparity(sample: Sample, states: tuple[int, ...]) -> bytes:
@@ -147,6 +148,22 @@ def _in_both(sample: Sample, later: NDArray[Any]) -> NDArray[np.bool_]:
 
 
 preparer, writer, verify = functions(KittiFlow)
+
+
+def _flow_png(flow: NDArray[np.float32], valid: NDArray[np.bool_]) -> bytes:
+    """KITTI's flow (H, W, 2) as 16-bit RGB: right and down in steps of 1/64 pixel from 2^15, and 1 if valid.
+
+    Flow beyond 512 pixels cannot be expressed and is invalid. Invalid flow is 0, 0, 0.
+    """
+    steps = np.rint(np.where(valid[..., None], flow.astype(np.float64), 0) * STEPS) + ZERO
+    has = valid & ((steps >= 0) & (steps <= 65535)).all(axis=-1)
+    return encode_png(np.where(has[..., None], np.dstack((steps, np.ones(has.shape))), 0).astype(np.uint16))
+
+
+def _ids_png(sample: Sample, bits: int = 8) -> Coded:
+    """The ids of objects, 0 for none, in a grey PNG of 8 or 16 bits."""
+    kind = np.uint8 if bits == 8 else np.uint16
+    return Coded(sample.index, f"ids {bits}.png", lambda: encode_png(sample.channels["instances"].astype(kind)))
 
 
 FORMAT = FormatSpec(

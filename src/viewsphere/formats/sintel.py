@@ -32,6 +32,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from functools import partial
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -43,7 +44,7 @@ from viewsphere.errors import UserError
 from viewsphere.formats import Scope
 from viewsphere.formats.shared.writing import refusals
 from viewsphere.formats.shared.writing.export_files import Coded
-from viewsphere.formats.shared.writing.flow_files import FLO_TAG, flo_file, states_png, tagged
+from viewsphere.formats.shared.writing.flow_files import FLO_TAG, UNKNOWN, states_png
 from viewsphere.formats.shared.writing.pictures import picture
 from viewsphere.formats.shared.writing.sequences import Eyes, check_whole, instants, number, scene, two_eyes
 from viewsphere.formats.shared.writing.tree import File, Tree, functions
@@ -92,13 +93,13 @@ class Sintel(Tree):
             yield from self._pair(sample, f"stereo/{root}", side, f"{name}.png")
         if side == "left":
             yield File(f"{root}/clean/{name}.png", picture(sample, ".png"))
-            yield File(f"{root}/depth/{name}.dpt", Coded(sample.index, "depth.dpt", lambda: tagged(sample.channels["depth"])))
+            yield File(f"{root}/depth/{name}.dpt", Coded(sample.index, "depth.dpt", lambda: _tagged(sample.channels["depth"])))
             yield File(f"{root}/camdata_left/{name}.cam", _cam(sample.camera))
             yield File(f"{root}/segmentation/{name}.png", Coded(sample.index, "ids 24.png", partial(_ids, sample)))
             if "albedo" in sample.channels:
                 yield File(f"{root}/albedo/{name}.png", Coded(sample.index, "albedo.png", partial(_albedo, sample)))
             if sample.instant < count - 1:
-                yield File(f"{root}/flow/{name}.flo", flo_file(sample))
+                yield File(f"{root}/flow/{name}.flo", _flo_file(sample))
                 yield File(f"{root}/occlusions/{name}.png", states_png(sample, "flow_state", 1, 2, 3))
                 yield File(f"{root}/invalid/{name}.png", states_png(sample, "flow_state", 3, 4))
 
@@ -140,6 +141,22 @@ def _albedo(sample: Sample) -> bytes:
 
 
 preparer, writer, verify = functions(Sintel)
+
+
+def _tagged(array: NDArray[Any]) -> bytes:
+    """Numbers (H, W) or (H, W, 2) after Middlebury's tag, width and height, as little-endian float32, row by row."""
+    height, width = array.shape[:2]
+    return FLO_TAG + np.array([width, height], "<i4").tobytes() + np.ascontiguousarray(array, "<f4").tobytes()
+
+
+def _flo_file(sample: Sample, channel: str = "flow") -> Coded:
+    """A channel of flow as .flo, with 1e10 for unknown flow."""
+
+    def make() -> bytes:
+        flow = sample.channels[channel]
+        return _tagged(np.where(np.isnan(flow), UNKNOWN, flow))
+
+    return Coded(sample.index, f"{channel}.flo", make)
 
 
 FORMAT = FormatSpec(

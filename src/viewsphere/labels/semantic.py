@@ -6,9 +6,9 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from viewsphere.labels.shared.class_maps import KEY, class_names, colored, with_classes, wrong_classes
+from viewsphere.labels.shared.class_maps import KEY, colored, with_classes, wrong_classes
 from viewsphere.labels.shared.spec import ChannelLabel, Drawing, Models, channel_of
-from viewsphere.model.annotations.classes import SKY, class_colors
+from viewsphere.model.annotations.classes import SKY, STUFF_IDS, class_colors
 from viewsphere.model.sample import Sample
 
 
@@ -19,9 +19,14 @@ def _prove(sample: Sample, models: Models) -> Iterator[str]:
         yield from wrong_classes(sample, classes, instances)
 
 
+def _class_names() -> str:
+    """The names of stuff with their ids, in words."""
+    return ", ".join(f"{i} {name}" for name, i in STUFF_IDS.items())
+
+
 LABEL = ChannelLabel(
     name="semantic",
-    meaning=f"class of what is seen: stuff below 32 ({class_names()}), things 31 + their category's id",
+    meaning=f"class of what is seen: stuff below 32 ({_class_names()}), things 31 + their category's id",
     dtype=np.int32,
     holds_classes=True,
     unit="class id",

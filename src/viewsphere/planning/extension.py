@@ -22,8 +22,6 @@ from viewsphere.composing.sendable import Sendable
 from viewsphere.composing.viewpoints.pose_numbers import (
     Indices,
     as_ranges,
-    first_numbers,
-    flat,
     follows_from_recipe,
     has_poses_of,
     joined_digests,
@@ -42,6 +40,7 @@ from viewsphere.validation.quantity import quantity
 
 if TYPE_CHECKING:
     from viewsphere.store import Store
+from viewsphere.composing.viewpoints.pose_numbers import names_of
 from viewsphere.store.index import Index, Ranges, numbers
 
 
@@ -171,7 +170,7 @@ class DatasetPart(Sendable):
         wanted, _ = numbered(self.record, self.plan.pose_list)
         of_recipe = np.full(self.record.poses, -1, np.int64)
         of_recipe[wanted] = np.arange(len(wanted))
-        return of_recipe[first_numbers(self.record)]
+        return of_recipe[_first_numbers(self.record)]
 
     @cached_property
     def _category_ids(self) -> dict[str, int]:
@@ -285,11 +284,11 @@ def _missing(planned: Plan, there: PlanRecord, wanted: Sequence[int]) -> Iterato
     for block in chain.from_iterable(part.blocks for part in there.parts if part.is_sampled):
         for key in block.subjects:
             held[key].append(block.positions)
-    first_of, asked = first_numbers(there), np.array(wanted, np.int64)
+    first_of, asked = _first_numbers(there), np.array(wanted, np.int64)
 
     @cache
     def lack(positions: Ranges, has: tuple[Ranges, ...]) -> Ranges:
-        return as_ranges(np.setdiff1d(asked[flat(positions)], first_of[flat(chain.from_iterable(has))]))
+        return as_ranges(np.setdiff1d(asked[_flat(positions)], first_of[_flat(chain.from_iterable(has))]))
 
     for block in planned.blocks:
         for poses, subjects in groupby(block.subjects, lambda key, block=block: lack(block.positions, tuple(held[key]))):
@@ -309,7 +308,7 @@ def _supplies(planned: Plan, there: PlanRecord, wanted: Sequence[int]) -> Iterat
             continue
         shown = set(part.subjects)
         absent = shown - subjects
-        poses = np.unique(first_numbers(there)[flat(chain.from_iterable(block.positions for block in part.blocks))])
+        poses = np.unique(_first_numbers(there)[_flat(chain.from_iterable(block.positions for block in part.blocks))])
         asked = np.array(wanted, np.int64)
         together = planned.recipe.scene.company is not None and subjects != shown
         if not part.is_product:
@@ -344,3 +343,14 @@ def _check_annotations(planned: Plan, part: Part) -> None:
 
 def _joined(old: Sequence[str], new: Iterable[str]) -> tuple[str, ...]:
     return tuple(dict.fromkeys((*old, *new)))
+
+
+def _flat(ranges: Iterable[tuple[int, int]]) -> Indices:
+    """The numbers of ranges [first, stop)."""
+    return np.concatenate([np.empty(0, np.int64), *(np.arange(first, stop) for first, stop in ranges)])
+
+
+def _first_numbers(there: PlanRecord) -> Indices:
+    """The first number of every pose: merged data sets may have a pose several times."""
+    _, first, which = np.unique(names_of(there), return_index=True, return_inverse=True)
+    return first[which].astype(np.int64)

@@ -15,11 +15,6 @@ def shared(splits: Splits) -> dict[str, float]:
     return {name: part for name, part in splits.shares.items() if not isinstance(part, tuple) and part}
 
 
-def hashed(splits: Splits, seed: int, names: tuple[str, ...]) -> str:
-    """The split for these names: each split gets about its share of all names, and no name affects the others."""
-    return drawn_split(shared(splits), seed, names)
-
-
 def drawn_split(shares: Mapping[str, float], seed: int, names: tuple[str, ...]) -> str:
     """The split for these names, given the splits' shares."""
     edges = tuple(accumulate(shares.values()))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
@@ -19,7 +20,7 @@ from viewsphere.planning.plan import Plan, plan
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.run.opening import prepare
 from viewsphere.run.progress import shown_on_terminal
-from viewsphere.run.shards import register_for_loaders, shard_of, shard_of_rank, shard_of_worker
+from viewsphere.run.shards import shard_of
 from viewsphere.run.shots.camera_collisions import CameraChecks
 from viewsphere.run.shots.framing import Framing
 from viewsphere.run.shots.precompile import precompile, told_to
@@ -56,12 +57,12 @@ class Frames(Shown, Iterable[Sample]):
         self._stages = Stages()
         self._taken: Iterator[Sample] | None = None
         self._is_compiled = False
-        register_for_loaders(type(self))
+        _register_for_loaders(type(self))
 
     def __getstate__(self) -> dict[str, Any]:
         """The state sent to workers of data loaders: this process's rank, but no warm caches."""
         cold = {"_stages": Stages(), "_taken": None, "_is_compiled": False}
-        return {**self.__dict__, "_shard": self._shard or shard_of_rank(), **cold}
+        return {**self.__dict__, "_shard": self._shard or _shard_of_rank(), **cold}
 
     def __repr__(self) -> str:
         loops = "endless" if self._epochs is None else f"epochs {self._epochs}"
@@ -72,7 +73,7 @@ class Frames(Shown, Iterable[Sample]):
         if self._epochs is None:
             raise TypeError("frames of epochs=None have no end, and no length")
         units = _RenderUnits(self.plan)
-        shard = self._shard or shard_of_rank()
+        shard = self._shard or _shard_of_rank()
         return self._epochs * (self.plan.frames if shard.of == 1 else shard.size(len(units)) * (self.plan.frames // len(units)))
 
     def __iter__(self) -> Iterator[Sample]:
@@ -93,7 +94,7 @@ class Frames(Shown, Iterable[Sample]):
 
     def _pass(self) -> Iterator[Sample]:
         """This process's frames in one loop."""
-        shard = (self._shard or shard_of_rank()).parted(shard_of_worker(self))
+        shard = (self._shard or _shard_of_rank()).parted(_shard_of_worker(self))
         epochs = count(self.epoch) if self._epochs is None else range(self.epoch, self.epoch + self._epochs)
         self.epoch += self._epochs or 0
         for epoch in epochs:
@@ -196,3 +197,33 @@ class _RenderUnits:
             row = self.plan.rows.row_at(first)
             yield row
             first = row.first + row.count
+
+
+def _shard_of_rank() -> Shard:
+    """The shard of this process among the ranks of PyTorch's default process group; all frames without a group."""
+    distributed: Any = sys.modules.get("torch.distributed")
+    if distributed is None or not distributed.is_available() or not distributed.is_initialized():
+        return Shard()
+    return Shard(distributed.get_rank(), distributed.get_world_size())
+
+
+def _shard_of_worker(frames: object) -> Shard:
+    """The shard of this process among the workers of a PyTorch DataLoader that iterates over its data set. It is all frames
+    outside such a worker, or if the loader itself chooses the items of each worker.
+
+    `frames` may be the loader's data set itself.
+    """
+    data: Any = sys.modules.get("torch.utils.data")
+    if data is None:
+        return Shard()
+    info = data.get_worker_info()
+    if info is None or not (info.dataset is frames or isinstance(info.dataset, data.IterableDataset)):
+        return Shard()
+    return Shard(info.id, info.num_workers)
+
+
+def _register_for_loaders(kind: type) -> None:
+    """Register a class as an iterable data set of PyTorch's DataLoader."""
+    data: Any = sys.modules.get("torch.utils.data")
+    if data is not None:
+        data.IterableDataset.register(kind)

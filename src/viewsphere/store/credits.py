@@ -8,8 +8,6 @@ from collections.abc import Iterable
 from contextlib import suppress
 from typing import TYPE_CHECKING
 
-import xxhash
-
 from viewsphere.files import read_bytes
 from viewsphere.model.credit import Credit
 from viewsphere.store.shots.records import ModelInfo
@@ -54,12 +52,6 @@ def escaped(text: str) -> str:
     """The text, escaped so that Markdown shows it unchanged, also in tables: no markup, HTML, formulas or cell ends."""
     printable = "".join(c if c.isprintable() else " " for c in text)
     return re.sub(r"([\\`*_\[\]<>|~&!$@:])", r"\\\1", printable)
-
-
-def credits_digest(models: Iterable[ModelInfo]) -> str | None:
-    """Digest of the file's text (xxh128, hexadecimal); None if no credit is known."""
-    text = credits_text(models)
-    return xxhash.xxh3_128(text.encode()).hexdigest() if text else None
 
 
 def write_credits(dataset: Dataset) -> None:

@@ -37,22 +37,6 @@ def strongest(bones: Int, weights: NDArray[np.float64], triangles: Int) -> Int:
     return np.where(sums[best] > 0, bone[best], found)
 
 
-def joined(pieces: Sequence[tuple[tuple[str, ...], Int | None, int]]) -> tuple[tuple[str, ...], NDArray[np.int32] | None]:
-    """The names of all bones of some pieces, each once, and the bone number of each triangle, from 1, 0 for none; None if no
-    piece has bones. Each piece gives the names of its bones, the bone of each triangle (None: no bones), and its number of
-    triangles.
-    """
-    names = tuple(dict.fromkeys(name for own, _, _ in pieces for name in own))
-    if not names:
-        return (), None
-    number = {name: i for i, name in enumerate(names, 1)}
-    parts = [
-        np.zeros(count, np.int32) if bone is None else np.array([*(number[name] for name in own), 0], np.int32)[bone]
-        for own, bone, count in pieces
-    ]
-    return names, np.concatenate(parts)
-
-
 def grouped(mesh: Mesh, parts: Mapping[str, Sequence[str]]) -> Mesh:
     """The mesh with its bones grouped into these named body parts; bones in none of them become 0. All named bones must be the
     mesh's.

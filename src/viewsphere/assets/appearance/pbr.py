@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
@@ -46,12 +45,6 @@ def made_of(material: Material, substance: ProceduralMaterial, first: int) -> Ma
         normal_texture=bumps,
         double_sided=material.double_sided,
     )
-
-
-def scaled(material: Material, metres: float) -> Material:
-    """The same material for uv in metres; its pictures span `metres`."""
-    names = ("base_color_texture", "metallic_roughness_texture", "normal_texture")
-    return replace(material, **{name: replace(getattr(material, name), scale=(1 / metres, 1 / metres)) for name in names})
 
 
 def pictures_of(substance: ProceduralMaterial) -> Pictures:

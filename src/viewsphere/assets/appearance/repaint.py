@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewsphere.assets.appearance.opaque import Stamp, opaque_picture, stamp_of
-from viewsphere.assets.appearance.pbr import is_replaceable, made_of, pictures_of, scaled
+from viewsphere.assets.appearance.pbr import is_replaceable, made_of, pictures_of
 from viewsphere.assets.mesh import Image, Material, Mesh, Texture
 from viewsphere.assets.primitive import face_normals
 from viewsphere.materials import is_grained, metres
@@ -57,7 +57,7 @@ def textured(mesh: Mesh, repaints: Sequence[Repaint], rest: Mesh | None = None) 
     for i, (material, own) in enumerate(zip(mesh.materials, found, strict=True)):
         if own.texture is not None:
             substance = own.texture
-            materials[i] = scaled(made_of(material, substance, len(images)), metres(substance.name, substance.seed))
+            materials[i] = _scaled(made_of(material, substance, len(images)), metres(substance.name, substance.seed))
             images += pictures_of(substance)
         elif own.image is not None:
             texcoord = 0 if material.base_color_texture is None else material.base_color_texture.texcoord
@@ -165,3 +165,9 @@ def _coordinates(places: _Float, way: NDArray[np.int64]) -> NDArray[np.float32]:
     u, v = np.where(turned, up, right), np.where(turned, right, -up)
     shift = part * _GOLDEN
     return np.stack([u + 0.3 * shift, v + shift], axis=1).astype(np.float32)
+
+
+def _scaled(material: Material, metres: float) -> Material:
+    """The same material for uv in metres; its pictures span `metres`."""
+    names = ("base_color_texture", "metallic_roughness_texture", "normal_texture")
+    return replace(material, **{name: replace(getattr(material, name), scale=(1 / metres, 1 / metres)) for name in names})

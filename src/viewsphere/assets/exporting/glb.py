@@ -15,11 +15,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewsphere.assets.animation.deforming import DeformingMesh
-from viewsphere.assets.exporting.rigged import Clip, RiggedModel, quaternions
+from viewsphere.assets.exporting.rigged import Clip, Float, RiggedModel
 from viewsphere.assets.exporting.runs import Run, runs
 from viewsphere.assets.mesh import Image, Material, Mesh, Texture
 from viewsphere.codecs.png_tiff import encode_png
 from viewsphere.files import open_file
+from viewsphere.geometry.rotation import quaternion_from_matrix
 
 WRAP_CODES = {"clamp": 33071, "mirror": 33648, "repeat": 10497}
 NEAREST, LINEAR, LINEAR_MIPMAP_LINEAR = 9728, 9729, 9987
@@ -69,7 +70,7 @@ def rigged_glb_bytes(model: RiggedModel) -> bytes:
     """
     writer = _Writer({}, skinned=model)
     writer.add_mesh(model.mesh)
-    first, rest = len(writer.meshes), quaternions(model.rest.turns)
+    first, rest = len(writer.meshes), _quaternions(model.rest.turns)
     nodes: list[Object] = [{"name": part["name"], "mesh": i, "skin": 0} for i, part in enumerate(writer.meshes)]
     for i, (name, above) in enumerate(zip(model.joints, model.above, strict=True)):
         own = [first + k for k, other in enumerate(model.above) if other == i]
@@ -242,7 +243,7 @@ class _Writer:
         times = self.keys(np.array(clip.seconds, np.float32).reshape(-1, 1), "SCALAR")
         turns = np.array([pose.turns for pose in clip.poses])
         outputs = [(0, "translation", self.keys(_y_up(np.array([pose.root for pose in clip.poses])), "VEC3"))]
-        outputs += [(i, "rotation", self.keys(quaternions(turns[:, i]), "VEC4")) for i in range(turns.shape[1])]
+        outputs += [(i, "rotation", self.keys(_quaternions(turns[:, i]), "VEC4")) for i in range(turns.shape[1])]
         samplers: list[Object] = [{"input": times, "output": output} for _, _, output in outputs]
         channels: list[Object] = [
             {"sampler": i, "target": {"node": first + node, "path": path}} for i, (node, path, _) in enumerate(outputs)
@@ -430,3 +431,15 @@ def _index(entries: list[Object], entry: Object) -> int:
     if entry not in entries:
         entries.append(entry)
     return entries.index(entry)
+
+
+def _quaternions(turns: Float) -> NDArray[np.float32]:
+    """Quaternions (N, 4), x, y, z, w, of successive rotations (N, 3, 3), without sign flips between them. They are in glTF's
+    axes, in which (x, y, z) is (x, z, -y).
+    """
+    found = np.array([quaternion_from_matrix(turn) for turn in turns])
+    for i in range(1, len(found)):
+        if float((found[i] * found[i - 1]).sum()) < 0:
+            found[i] = -found[i]
+    w, x, y, z = found.T
+    return np.stack([x, z, -y, w], axis=1).astype(np.float32)

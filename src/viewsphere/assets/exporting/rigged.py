@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewsphere.assets.mesh import Mesh
-from viewsphere.geometry.rotation import compose, quaternion_from_matrix, rigid
+from viewsphere.geometry.rotation import compose, rigid
 
 Float = NDArray[np.float64]
 
@@ -64,15 +64,3 @@ def joints_at(places: Float, above: tuple[int, ...], pose: Pose) -> Float:
         else:
             found.append(compose(found[parent], rigid(pose.turns[i], places[i] - places[parent])))
     return np.array(found)
-
-
-def quaternions(turns: Float) -> NDArray[np.float32]:
-    """Quaternions (N, 4), x, y, z, w, of successive rotations (N, 3, 3), without sign flips between them. They are in glTF's
-    axes, in which (x, y, z) is (x, z, -y).
-    """
-    found = np.array([quaternion_from_matrix(turn) for turn in turns])
-    for i in range(1, len(found)):
-        if float((found[i] * found[i - 1]).sum()) < 0:
-            found[i] = -found[i]
-    w, x, y, z = found.T
-    return np.stack([x, z, -y, w], axis=1).astype(np.float32)

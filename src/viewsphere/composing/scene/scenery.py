@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
 from functools import lru_cache
@@ -16,9 +15,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from viewsphere.assets.paths.inside import split_source
 from viewsphere.composing.placing import Footprint, footprint, standing
-from viewsphere.composing.scene.pictures import IMAGE_SUFFIXES, files_in, proportions
 from viewsphere.composing.scene.place_file import FileOffers, offers_of
-from viewsphere.composing.seeds import Names, generator, scene_generators, share
+from viewsphere.composing.seeds import Names, generator, scene_generators
 from viewsphere.errors import ModelError, RecipeError
 from viewsphere.geometry.box3d import Box3d
 from viewsphere.geometry.rotation import compose, transform
@@ -30,7 +28,7 @@ from viewsphere.recipe.draws import drawn
 from viewsphere.recipe.models import unit_metres
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.recipe.world.motion import Motions
-from viewsphere.recipe.world.scenery import Labels, PlaceEntry, PlaneEntry
+from viewsphere.recipe.world.scenery import Labels, PlaceEntry
 from viewsphere.validation.errors import nearest, one_of
 
 TRIES = 200
@@ -275,90 +273,3 @@ def scenery_key(name: str, rest: str) -> str:
     """A readable key that differs for other scenery."""
     safe = "".join(c if c.isalnum() or c in "-_" else "_" for c in name)[:60]
     return f"{SCENERY}{safe}-{hashlib.sha256(f'{name}/{rest}'.encode()).hexdigest()[:10]}"
-
-
-def plane_images(recipe: Recipe) -> tuple[tuple[str, ...], ...]:
-    """Absolute paths of the pictures of each entry of planes, sorted; raises RecipeError if there are none."""
-    images: list[tuple[str, ...]] = []
-    for i, entry in enumerate(recipe.scene.planes):
-        if entry.image is not None:
-            path = recipe.folder / Path(entry.image).expanduser()
-            files = (path.as_posix(),) if path.is_file() else ()
-            problem = f"scene.planes[{i}].image: expected an image file; found none at {path}"
-        else:
-            folder = recipe.folder / Path(entry.images or "").expanduser()
-            files = files_in(folder)
-            endings = ", ".join(IMAGE_SUFFIXES)
-            problem = f"scene.planes[{i}].images: expected a folder with images ({endings}); found none in {folder}"
-        if not files:
-            raise RecipeError(problem)
-        images.append(files)
-    return tuple(images)
-
-
-def plane_spec(recipe: Recipe, entry: PlaneEntry, path: str, category_id: Naming) -> ModelSpec:
-    """The model of a plane with this picture."""
-    file = Path(path)
-    inside = file.relative_to(recipe.folder) if file.is_relative_to(recipe.folder) else file.name
-    return ModelSpec(
-        key=scenery_key(file.stem, f"{inside} {entry.height!r}"),
-        source=path,
-        category=entry.category,
-        category_id=category_id(entry.category, entry.labels),
-        unit=entry.height,
-        centring="floor",
-    )
-
-
-def plane_pieces(
-    recipe: Recipe,
-    images: Sequence[Sequence[str]],
-    model: str,
-    pose: str | None,
-    targets: Sequence[Footprint],
-    category_id: Naming,
-    redraw: Names = (),
-) -> Iterator[SceneryPiece]:
-    """The planes of one model, or of one frame, clear of the targets and of one another; `redraw` names another draw.
-
-    Raises RecipeError if that cannot be.
-    """
-    standing_there = list(targets)
-    for i, entry in enumerate(recipe.scene.planes):
-        names = (*draw_names(entry.draw, model, pose), *redraw)
-        count = drawn(entry.count, scene_generators(recipe.seed, names), ("planes", str(i), "count"))
-        for j in range(count):
-            purpose = (*names, str(i), str(j))
-            if share(recipe.seed, "plane shown", *purpose) >= entry.share:
-                continue
-            rng = generator(recipe.seed, "plane", *purpose)
-            path = images[i][int(rng.integers(len(images[i])))]
-            half = entry.height * proportions(path) / 2
-            box = Box3d.between((-half, 0.0, 0.0), (half, 0.0, entry.height)).corners
-            move = _plane_spot(f"scene.planes[{i}]", entry, rng, box, standing_there)
-            standing_there.append(footprint(box, move))
-            yield SceneryPiece(plane_spec(recipe, entry, path, category_id), move, entry.labels)
-
-
-def _plane_spot(
-    where: str, entry: PlaneEntry, rng: np.random.Generator, box: NDArray[np.float64], others: Sequence[Footprint]
-) -> Matrix4:
-    if entry.at is not None:
-        move = standing(box, *entry.at)
-        if not all(footprint(box, move).apart(other, 0.0) for other in others):
-            raise RecipeError(
-                f"{where}.at: expected the plane clear of the models and of other planes; found it in one: move it"
-            )
-        return move
-    assert entry.around is not None
-    (near, far), (low, high) = entry.around.distance, entry.around.azimuth
-    for _ in range(TRIES):
-        distance, azimuth = near + rng.random() * (far - near), low + rng.random() * (high - low)
-        x, y = distance * math.sin(math.radians(azimuth)), -distance * math.cos(math.radians(azimuth))
-        move = standing(box, x, y, azimuth + 180.0)
-        if all(footprint(box, move).apart(other, 0.0) for other in others):
-            return move
-    raise RecipeError(
-        f"{where}.around: expected room for the plane clear of the models and of other planes; found none: "
-        "ask for fewer, or for a larger distance"
-    )

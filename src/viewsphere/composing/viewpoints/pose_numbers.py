@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import hashlib
 from base64 import b64decode, b64encode
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -82,23 +82,12 @@ def numbered(there: PlanRecord, views: Poses) -> tuple[Sequence[int], Names]:
     return [number_of[name] for name in wanted.tolist()], new
 
 
-def first_numbers(there: PlanRecord) -> Indices:
-    """The first number of every pose: merged data sets may have a pose several times."""
-    _, first, which = np.unique(names_of(there), return_index=True, return_inverse=True)
-    return first[which].astype(np.int64)
-
-
 def has_poses_of(there: PlanRecord, views: Poses) -> bool:
     """Return whether the data set has these poses in this order, judging by its recipe alone."""
     brought = [part for part in there.parts if part.new_poses]
     if len(brought) != 1 or brought[0].pose_names is not None or not follows_from_recipe(views):
         return False
     return there.poses == len(views) and _views(brought[0]) == views
-
-
-def flat(ranges: Iterable[tuple[int, int]]) -> Indices:
-    """The numbers of ranges [first, stop)."""
-    return np.concatenate([np.empty(0, np.int64), *(np.arange(first, stop) for first, stop in ranges)])
 
 
 def as_ranges(numbers: Indices) -> Ranges:

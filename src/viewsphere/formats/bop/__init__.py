@@ -43,6 +43,7 @@ https://github.com/thodan/bop_toolkit/blob/master/docs/bop_datasets_format.md.
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterator, Mapping
 from typing import Any, Literal
 
@@ -70,7 +71,7 @@ from viewsphere.formats.shared.writing.export_files import Coded, Content
 from viewsphere.formats.shared.writing.paper import json_bytes
 from viewsphere.formats.shared.writing.pictures import picture, suffix_of
 from viewsphere.formats.shared.writing.refusals import known_cameras, lacking_labels, pinhole
-from viewsphere.formats.shared.writing.tree import FOLDER_SIZE, LIST, OBJECT, File, Layout, Piece, Tree, functions, item, member
+from viewsphere.formats.shared.writing.tree import FOLDER_SIZE, LIST, OBJECT, File, Layout, Piece, Tree, functions, item
 from viewsphere.model.fields.frozen import Frozen
 from viewsphere.model.sample import Sample
 from viewsphere.plugins.format import FormatSpec
@@ -145,9 +146,9 @@ class Bop(Tree):
         for n, entry in enumerate(found):
             yield File(f"{folder}/mask/{image:06d}_{n:06d}.png", mask_png(entry.mask))
             yield File(f"{folder}/mask_visib/{image:06d}_{n:06d}.png", mask_png(entry.mask_visib))
-        yield member(f"{folder}/scene_camera.json", str(image), camera(sample, scale))
-        yield member(f"{folder}/scene_gt.json", str(image), [entry.pose for entry in found])
-        yield member(f"{folder}/scene_gt_info.json", str(image), [entry.info for entry in found])
+        yield _member(f"{folder}/scene_camera.json", str(image), camera(sample, scale))
+        yield _member(f"{folder}/scene_gt.json", str(image), [entry.pose for entry in found])
+        yield _member(f"{folder}/scene_gt_info.json", str(image), [entry.info for entry in found])
         size = {"width": sample.width, "height": sample.height}
         yield item(f"{folder}/scene_gt_coco.json", {"id": image, "file_name": name, **size}, "images")
         ids = [image * self.dataset.plan.most_objects(sample.index) + n for n in range(1, len(found) + 1)]
@@ -169,7 +170,7 @@ class Bop(Tree):
         files = ((name, self._loaded(content)) for name, content in self._imagewise(sample, found))
         data = b"".join(tar.member(f"{key}.{name}", held) for name, held in files)
         yield Piece(f"{_split(sample)}/shard-{number:06d}.tar", data)
-        yield member(f"{_split(sample)}/key_to_shard.json", key, number)
+        yield _member(f"{_split(sample)}/key_to_shard.json", key, number)
 
     def _loaded(self, content: Content) -> bytes:
         if isinstance(content, Coded):
@@ -218,6 +219,11 @@ def _place(dataset: Dataset, sample: Sample) -> tuple[int, int]:
 
 
 preparer, writer, verify = functions(Bop)
+
+
+def _member(path: str, key: str, value: Any, section: str = "") -> Piece:
+    """A key of a JSON object, and its value."""
+    return Piece(path, json.dumps(key).encode() + b":" + json_bytes(value), section, b",\n")
 
 
 FORMAT = FormatSpec(

@@ -38,15 +38,16 @@ https://github.com/mcordts/cityscapesScripts, docs/csCalibration.pdf there.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from pydantic import Field
 
 from viewsphere.codecs.png_tiff import encode_png
 from viewsphere.formats import Scope
-from viewsphere.formats.cityscapes.classes import COLORS, LABELS, labels_of
+from viewsphere.formats.cityscapes.classes import COLORS, LABELS, label_of
 from viewsphere.formats.cityscapes.instances import EACH, Region, regions
 from viewsphere.formats.shared.writing import refusals
 from viewsphere.formats.shared.writing.export_files import Coded
@@ -55,6 +56,7 @@ from viewsphere.formats.shared.writing.pictures import picture, png
 from viewsphere.formats.shared.writing.sequences import Eyes, two_eyes
 from viewsphere.formats.shared.writing.timeline import Timeline
 from viewsphere.formats.shared.writing.tree import FOLDER_SIZE, File, Tree, functions
+from viewsphere.model.annotations.classes import SemanticClass
 from viewsphere.model.fields.frozen import Frozen
 from viewsphere.model.sample import Sample
 from viewsphere.plugins.format import FormatSpec
@@ -93,7 +95,7 @@ class _Cityscapes(Tree):
     def __init__(self, dataset: Dataset, options: _Options) -> None:
         super().__init__(dataset)
         self._options, self._eyes, self._timeline = options, Eyes(dataset), Timeline(dataset)
-        self._labels = labels_of(dataset.classes)
+        self._labels = _labels_of(dataset.classes)
 
     def sample_files(self, sample: Sample) -> Iterator[File]:
         """A picture and, for a left one, its camera and labels."""
@@ -152,6 +154,14 @@ def _camera(sample: Sample, baseline: float) -> dict[str, dict[str, float]]:
 
 
 preparer, writer, verify = functions(_Cityscapes)
+
+
+def _labels_of(classes: Sequence[SemanticClass]) -> NDArray[np.uint8]:
+    """Labels (N,) by the classes' ids; 0 (unlabeled) for numbers without a class."""
+    table = np.zeros(1 + max(one.id for one in classes), np.uint8)
+    for one in classes:
+        table[one.id] = label_of(one)
+    return table
 
 
 FORMAT = FormatSpec(

@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-
-import numpy as np
-from numpy.typing import NDArray
+from collections.abc import Mapping
 
 from viewsphere.model.annotations.classes import SemanticClass
 
@@ -82,11 +79,3 @@ def label_of(one: SemanticClass) -> int:
     name = " ".join(one.name.lower().replace("_", " ").replace("-", " ").split())
     name = _OTHERS.get(name, name)
     return LABELS.index(name if name in COLORS else "dynamic" if one.is_thing else "static")
-
-
-def labels_of(classes: Sequence[SemanticClass]) -> NDArray[np.uint8]:
-    """Labels (N,) by the classes' ids; 0 (unlabeled) for numbers without a class."""
-    table = np.zeros(1 + max(one.id for one in classes), np.uint8)
-    for one in classes:
-        table[one.id] = label_of(one)
-    return table

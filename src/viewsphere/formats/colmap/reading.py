@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from viewsphere.errors import StoreError
 from viewsphere.files import read_bytes, read_text
-from viewsphere.formats.shared.reading.as_recipe import cameras_again, nearest_up, pose_of
+from viewsphere.formats.shared.reading.as_recipe import cameras_again, pose_of
 from viewsphere.formats.shared.reading.image_lists import MISTAKES, one_line
 from viewsphere.formats.shared.reading.posed_pictures import (
     MOST,
@@ -27,6 +27,7 @@ from viewsphere.geometry.lenses import LensParameters, opencv_parameters
 from viewsphere.geometry.lenses.shared.colmap import NAMES, PARAMETERS, has_own_lens, own_lens
 from viewsphere.geometry.rotation import matrix_from_quaternion, transform
 from viewsphere.model.listed import ListedShot
+from viewsphere.model.model_spec import Axis
 from viewsphere.model.sensors.camera import Intrinsics
 from viewsphere.store.foreign import ForeignDataset
 from viewsphere.store.paths import is_name
@@ -213,4 +214,12 @@ def source_cameras(path: Path) -> SourceCameras:
         except MISTAKES as error:
             problems.append(f"{model.file}: image {image.name!r:.80}: {one_line(error)}")
     refuse_any(problems)
-    return cameras_again(path, tuple(shots), path, _FOLDERS, "colmap", nearest_up(shots))
+    return cameras_again(path, tuple(shots), path, _FOLDERS, "colmap", _nearest_up(shots))
+
+
+def _nearest_up(shots: Sequence[ListedShot]) -> Axis:
+    """The axis of the world that is nearest to the cameras' mean up direction."""
+    up = -np.array([np.array(shot.world_from_camera)[:3, 1] for shot in shots]).reshape(-1, 3).sum(axis=0)
+    axes: tuple[tuple[Axis, Axis], ...] = (("+x", "-x"), ("+y", "-y"), ("+z", "-z"))
+    largest = int(np.abs(up).argmax())
+    return axes[largest][int(up[largest] < 0)]

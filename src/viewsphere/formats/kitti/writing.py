@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Iterator, Mapping
 from functools import lru_cache
@@ -11,13 +12,24 @@ import numpy as np
 from pydantic import Field
 
 from viewsphere.errors import UserError
-from viewsphere.formats.shared.kitti import DONT_CARE, Car, calibration, calibration_text, car_in, nobody_cares, row, velodyne
+from viewsphere.formats.shared.kitti import (
+    DONT_CARE,
+    NO_ANGLE,
+    NO_BOX,
+    NO_SHARE,
+    Car,
+    calibration,
+    calibration_text,
+    car_in,
+    velodyne,
+)
 from viewsphere.formats.shared.mounting import Float
 from viewsphere.formats.shared.writing.pictures import picture
 from viewsphere.formats.shared.writing.timeline import Timeline
 from viewsphere.formats.shared.writing.tree import File, Piece, Tree, line
+from viewsphere.labels.kitti_levels import LARGELY_HIDDEN, LARGELY_OUTSIDE, PARTLY, TRUNCATED, UNKNOWN
 from viewsphere.model.fields.frozen import Frozen
-from viewsphere.model.sample import Sample
+from viewsphere.model.sample import Box, ObjectAnnotation, Sample
 from viewsphere.model.sensors.rig import CAMERA, Rig
 from viewsphere.store import Dataset
 
@@ -102,8 +114,8 @@ class Kitti(Tree):
     def _labels(self, sample: Sample, rig: Rig | None, car: Car, name: str) -> Iterator[File | Piece]:
         """The lines of a frame's objects and, if known, the calibration of its cameras."""
         seen = [o for o in sample.objects if o.box2d is not None]
-        rows = [row(o, type_of(o.category), self._task == "tracking") for o in seen]
-        regions = [nobody_cares(box) for box in (sample.source or {}).get(DONT_CARE, ())]
+        rows = [_row(o, type_of(o.category), self._task == "tracking") for o in seen]
+        regions = [_nobody_cares(box) for box in (sample.source or {}).get(DONT_CARE, ())]
         calibrated = None if rig is None else _text(calibration(rig, car, sample.camera.intrinsics), self._task)
         if self._task == "object":
             yield File(f"training/label_2/{name}.txt", "".join(f"{row}\n" for row in (*rows, *regions)).encode())
@@ -133,3 +145,61 @@ def _text(calibrated: Mapping[str, Float], task: str) -> bytes:
     """The text of a calibration, with the keys of a task."""
     others = (np.eye(3), calibrated["velo"], np.eye(3, 4))
     return calibration_text(calibrated, *zip(CALIBRATED[task], others, strict=True))
+
+
+def _nobody_cares(region: Box) -> str:
+    """The line of a region that evaluations leave out, without its end."""
+    numbers = " ".join(f"{number + 0.0:.9g}" for number in (NO_ANGLE, *_inclusive(region), *NO_BOX))
+    return f"DontCare {NO_SHARE} {NO_SHARE} {numbers}"
+
+
+def _row(o: ObjectAnnotation, kind: str, in_grades: bool) -> str:
+    """A line of labels, without its end, for an object of this type; its truncation is a share or a grade."""
+    assert o.box2d is not None
+    alpha, box = _upright(o) if o.is_boxed else (NO_ANGLE, NO_BOX)
+    alpha = (o.source or {}).get("alpha", alpha)
+    start = f"{kind} {_outside(o, in_grades):.6g} {_hidden(o)}"
+    return " ".join([start, *(f"{number + 0.0:.9g}" for number in (alpha, *_inclusive(o.box2d), *box))])
+
+
+def _outside(o: ObjectAnnotation, in_grades: bool) -> float:
+    """Return the part of an object outside the picture, as a share or a grade. Imported objects may have only one of them, or
+    neither.
+    """
+    if in_grades and "truncation_level" in o.extra:
+        return int(o.extra["truncation_level"])
+    if math.isnan(o.truncation):
+        return NO_SHARE
+    return (o.truncation > TRUNCATED) + (o.truncation > LARGELY_OUTSIDE) if in_grades else o.truncation
+
+
+def _hidden(o: ObjectAnnotation) -> int:
+    """KITTI's grade of occlusion, also for merged objects, for which only the shares are stored."""
+    if "occlusion_level" in o.extra:
+        return int(o.extra["occlusion_level"])
+    if math.isnan(o.visibility) or o.truncation >= 1:
+        return UNKNOWN
+    hidden = 1 - o.visibility / (1 - o.truncation)
+    return (hidden > PARTLY) + (hidden > LARGELY_HIDDEN)
+
+
+def _inclusive(box: Box) -> Box:
+    """The first and the last column and row of half-open corners (x0, y0, x1, y1)."""
+    x0, y0, x1, y1 = box
+    return x0, y0, x1 - 1, y1 - 1
+
+
+def _upright(o: ObjectAnnotation) -> tuple[float, tuple[float, ...]]:
+    """alpha; and height, width, length, x, y, z (metres, camera axes, the middle of the bottom) and rotation_y (radians) of
+    the object's box, set upright in the camera's axes around the same middle.
+    """
+    width, height, length = o.size
+    x, y, z = o.box3d_camera.mean(axis=0).tolist()
+    front = -o.camera_from_object[:3, 1]
+    turn = math.atan2(-front[2], front[0])
+    return _wrapped(turn - math.atan2(x, z)), (height, width, length, x, y + height / 2, z, turn)
+
+
+def _wrapped(angle: float) -> float:
+    """The same angle in [-pi, pi]."""
+    return math.remainder(angle, 2 * math.pi)

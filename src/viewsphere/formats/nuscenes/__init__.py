@@ -30,7 +30,9 @@ https://github.com/nutonomy/nuscenes-devkit/blob/master/docs/schema_nuscenes.md.
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Iterator, Mapping
+import re
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import lru_cache, partial
 from itertools import chain
 
@@ -40,17 +42,19 @@ from pydantic import Field
 from viewsphere.codecs.png_tiff import encode_png
 from viewsphere.errors import UserError
 from viewsphere.formats import Scope
-from viewsphere.formats.nuscenes.names import LOG, MAP, alike, category_of, channels_of, modalities, token
-from viewsphere.formats.nuscenes.story import story_of
+from viewsphere.formats.nuscenes.names import LOG, MAP, category_of, modalities, token
+from viewsphere.formats.nuscenes.story import Story
 from viewsphere.formats.nuscenes.view import KINDS, Record, View, category_record, points, visibilities
 from viewsphere.formats.shared.mounting import pointless
 from viewsphere.formats.shared.writing.paper import json_bytes
 from viewsphere.formats.shared.writing.pictures import picture
 from viewsphere.formats.shared.writing.refusals import pinhole, sequences
-from viewsphere.formats.shared.writing.timeline import Timeline, unknown_shots
+from viewsphere.formats.shared.writing.timeline import Course, Timeline, unknown_shots
 from viewsphere.formats.shared.writing.tree import LIST, File, Layout, Piece, Tree, functions, item
 from viewsphere.model.fields.frozen import Frozen
 from viewsphere.model.sample import Sample
+from viewsphere.model.sensors.camera import Intrinsics
+from viewsphere.model.sensors.rig import CAMERA, Rig
 from viewsphere.plugins.format import FormatSpec
 from viewsphere.store import Dataset
 
@@ -69,10 +73,10 @@ def _refuses(scope: Scope, options: _Options) -> Iterator[str]:
     yield from unknown_shots(scope)
     yield from pinhole(scope)
     yield from pointless(scope)
-    yield from alike("categories", [(category.name, category_of(category.name)) for category in scope.categories])
+    yield from _alike("categories", [(category.name, category_of(category.name)) for category in scope.categories])
     if scope.rig is not None:
         names = (sensor.name for sensor in scope.rig.sensors)
-        yield from alike("sensors", list(zip(names, channels_of(scope.rig), strict=True)))
+        yield from _alike("sensors", list(zip(names, _channels_of(scope.rig), strict=True)))
 
 
 class _NuScenes(Tree):
@@ -82,9 +86,9 @@ class _NuScenes(Tree):
         super().__init__(dataset)
         self._version = options.version
         self._timeline = Timeline(dataset)
-        self._story = lru_cache(maxsize=2)(partial(story_of, self._timeline))
+        self._story = lru_cache(maxsize=2)(partial(_story_of, self._timeline))
         shot = next(iter(dataset.shots_of_parts), None)
-        self._kinds = {} if shot is None else dict(zip(channels_of(shot.rig), modalities(shot.rig), strict=True))
+        self._kinds = {} if shot is None else dict(zip(_channels_of(shot.rig), modalities(shot.rig), strict=True))
 
     def sample_files(self, sample: Sample) -> Iterator[File | Piece]:
         """Yield the files and records of a sensor's sample. The first sensor of an instant also adds the records of the whole
@@ -92,7 +96,7 @@ class _NuScenes(Tree):
         """
         course, (shot, instant, place) = self._timeline.course(sample), self._timeline.position(sample)
         start, story = sample.index - place, self._story(course)
-        view, channel = View(sample, shot, instant, place, course, story), channels_of(shot.rig)[place]
+        view, channel = View(sample, shot, instant, place, course, story), _channels_of(shot.rig)[place]
         if self._kinds.get(channel) != view.modality:
             raise UserError(f"nuscenes: expected the sensors {', '.join(self._kinds)} in all sequences; found {channel}")
         yield File(view.file(channel), points(sample) if view.modality == "lidar" else picture(sample, *KINDS))
@@ -140,6 +144,46 @@ class _NuScenes(Tree):
 
 
 preparer, writer, verify = functions(_NuScenes)
+
+
+def _channels_of(rig: Rig) -> tuple[str, ...]:
+    """The channels of a rig's sensors, in the rig's order."""
+    lidars = sum(sensor.lidar is not None for sensor in rig.sensors)
+    found: list[str] = []
+    for sensor in rig.sensors:
+        name = re.sub(r"[^A-Z0-9]", "_", sensor.name.upper())
+        if sensor.lidar is not None:
+            found.append("LIDAR_TOP" if lidars == 1 else f"LIDAR_{name}")
+        else:
+            found.append("CAM_FRONT" if sensor.name == CAMERA else f"CAM_{name}")
+    return tuple(found)
+
+
+def _alike(what: str, named: Sequence[tuple[str, str]]) -> Iterator[str]:
+    """Yield an error for names that are equal in nuScenes, from pairs of a name and its name there."""
+    counts = Counter(own for _, own in named)
+    for name in (name for name, count in counts.items() if count > 1):
+        found = ", ".join(other for other, own in named if own == name)
+        yield f"expected {what} of different names in nuScenes; found {found}, all {name}"
+
+
+def _story_of(timeline: Timeline, course: Course) -> Story:
+    """Return the instants, sensors, objects, lenses and splits of a sequence's finished and chosen samples; reads its shots."""
+    sensors, objects = dict[int, list[int]](), dict[int, list[int]]()
+    lenses, splits, instants = dict[int, Intrinsics](), dict[str, None](), dict[int, None]()
+    for shot in timeline.shots(course):
+        for index, place, sensor in shot.samples:
+            if not timeline.has(index):
+                continue
+            now = shot.instants[place]
+            if now.index not in instants:
+                for thing in shot.objects:
+                    if thing.motion.pose_at(place) is not None:
+                        objects.setdefault(thing.id, []).append(now.index)
+            instants[now.index] = splits[now.split] = None
+            sensors.setdefault(sensor, []).append(now.index)
+            lenses.setdefault(sensor, shot.camera(place, sensor).intrinsics)
+    return Story(tuple(instants), sensors, objects, lenses, tuple(splits))
 
 
 FORMAT = FormatSpec(

@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-import re
-from collections import Counter
-from collections.abc import Iterator, Sequence
 from hashlib import blake2b
 
-from viewsphere.model.sensors.rig import CAMERA, Rig
+from viewsphere.model.sensors.rig import Rig
 
 CATEGORIES = {
     "animal": "animal",
@@ -39,27 +36,6 @@ def category_of(name: str) -> str:
     return CATEGORIES.get(name.casefold(), name)
 
 
-def channels_of(rig: Rig) -> tuple[str, ...]:
-    """The channels of a rig's sensors, in the rig's order."""
-    lidars = sum(sensor.lidar is not None for sensor in rig.sensors)
-    found: list[str] = []
-    for sensor in rig.sensors:
-        name = re.sub(r"[^A-Z0-9]", "_", sensor.name.upper())
-        if sensor.lidar is not None:
-            found.append("LIDAR_TOP" if lidars == 1 else f"LIDAR_{name}")
-        else:
-            found.append("CAM_FRONT" if sensor.name == CAMERA else f"CAM_{name}")
-    return tuple(found)
-
-
 def modalities(rig: Rig) -> tuple[str, ...]:
     """Return the modality of each sensor, in the rig's order: `camera` or `lidar`."""
     return tuple("camera" if sensor.lidar is None else "lidar" for sensor in rig.sensors)
-
-
-def alike(what: str, named: Sequence[tuple[str, str]]) -> Iterator[str]:
-    """Yield an error for names that are equal in nuScenes, from pairs of a name and its name there."""
-    counts = Counter(own for _, own in named)
-    for name in (name for name, count in counts.items() if count > 1):
-        found = ", ".join(other for other, own in named if own == name)
-        yield f"expected {what} of different names in nuScenes; found {found}, all {name}"

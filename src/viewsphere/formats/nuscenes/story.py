@@ -6,7 +6,6 @@ from bisect import bisect_left
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from viewsphere.formats.shared.writing.timeline import Course, Timeline
 from viewsphere.model.sensors.camera import Intrinsics
 
 
@@ -21,25 +20,6 @@ class Story:
     objects: dict[int, list[int]]
     lenses: dict[int, Intrinsics]
     splits: tuple[str, ...]
-
-
-def story_of(timeline: Timeline, course: Course) -> Story:
-    """Return the instants, sensors, objects, lenses and splits of a sequence's finished and chosen samples; reads its shots."""
-    sensors, objects = dict[int, list[int]](), dict[int, list[int]]()
-    lenses, splits, instants = dict[int, Intrinsics](), dict[str, None](), dict[int, None]()
-    for shot in timeline.shots(course):
-        for index, place, sensor in shot.samples:
-            if not timeline.has(index):
-                continue
-            now = shot.instants[place]
-            if now.index not in instants:
-                for thing in shot.objects:
-                    if thing.motion.pose_at(place) is not None:
-                        objects.setdefault(thing.id, []).append(now.index)
-            instants[now.index] = splits[now.split] = None
-            sensors.setdefault(sensor, []).append(now.index)
-            lenses.setdefault(sensor, shot.camera(place, sensor).intrinsics)
-    return Story(tuple(instants), sensors, objects, lenses, tuple(splits))
 
 
 def neighbours(instants: Sequence[int], instant: int) -> tuple[int | None, int | None]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Mapping
 from typing import NamedTuple
 
@@ -12,8 +11,7 @@ from viewsphere.errors import UserError
 from viewsphere.formats import Scope
 from viewsphere.formats.shared.mounting import CAMERA_FROM_LIDAR, Float, centred, measured, mounted, pointless, unmoved
 from viewsphere.geometry.rotation import compose, product, transform
-from viewsphere.labels.kitti_levels import LARGELY_HIDDEN, LARGELY_OUTSIDE, PARTLY, TRUNCATED, UNKNOWN
-from viewsphere.model.sample import Box, ObjectAnnotation, Sample
+from viewsphere.model.sample import Sample
 from viewsphere.model.sensors.camera import Intrinsics
 from viewsphere.model.sensors.rig import Rig
 from viewsphere.model.shot import Shot
@@ -114,61 +112,3 @@ NO_ANGLE, NO_SHARE = -10.0, -1
 
 DONT_CARE = "dont_care"
 """The key in an imported picture's `source` for the boxes (half-open corners) of regions that evaluations leave out."""
-
-
-def nobody_cares(region: Box) -> str:
-    """The line of a region that evaluations leave out, without its end."""
-    numbers = " ".join(f"{number + 0.0:.9g}" for number in (NO_ANGLE, *_inclusive(region), *NO_BOX))
-    return f"DontCare {NO_SHARE} {NO_SHARE} {numbers}"
-
-
-def row(o: ObjectAnnotation, kind: str, in_grades: bool) -> str:
-    """A line of labels, without its end, for an object of this type; its truncation is a share or a grade."""
-    assert o.box2d is not None
-    alpha, box = _upright(o) if o.is_boxed else (NO_ANGLE, NO_BOX)
-    alpha = (o.source or {}).get("alpha", alpha)
-    start = f"{kind} {_outside(o, in_grades):.6g} {_hidden(o)}"
-    return " ".join([start, *(f"{number + 0.0:.9g}" for number in (alpha, *_inclusive(o.box2d), *box))])
-
-
-def _outside(o: ObjectAnnotation, in_grades: bool) -> float:
-    """Return the part of an object outside the picture, as a share or a grade. Imported objects may have only one of them, or
-    neither.
-    """
-    if in_grades and "truncation_level" in o.extra:
-        return int(o.extra["truncation_level"])
-    if math.isnan(o.truncation):
-        return NO_SHARE
-    return (o.truncation > TRUNCATED) + (o.truncation > LARGELY_OUTSIDE) if in_grades else o.truncation
-
-
-def _hidden(o: ObjectAnnotation) -> int:
-    """KITTI's grade of occlusion, also for merged objects, for which only the shares are stored."""
-    if "occlusion_level" in o.extra:
-        return int(o.extra["occlusion_level"])
-    if math.isnan(o.visibility) or o.truncation >= 1:
-        return UNKNOWN
-    hidden = 1 - o.visibility / (1 - o.truncation)
-    return (hidden > PARTLY) + (hidden > LARGELY_HIDDEN)
-
-
-def _inclusive(box: Box) -> Box:
-    """The first and the last column and row of half-open corners (x0, y0, x1, y1)."""
-    x0, y0, x1, y1 = box
-    return x0, y0, x1 - 1, y1 - 1
-
-
-def _upright(o: ObjectAnnotation) -> tuple[float, tuple[float, ...]]:
-    """alpha; and height, width, length, x, y, z (metres, camera axes, the middle of the bottom) and rotation_y (radians) of
-    the object's box, set upright in the camera's axes around the same middle.
-    """
-    width, height, length = o.size
-    x, y, z = o.box3d_camera.mean(axis=0).tolist()
-    front = -o.camera_from_object[:3, 1]
-    turn = math.atan2(-front[2], front[0])
-    return _wrapped(turn - math.atan2(x, z)), (height, width, length, x, y + height / 2, z, turn)
-
-
-def _wrapped(angle: float) -> float:
-    """The same angle in [-pi, pi]."""
-    return math.remainder(angle, 2 * math.pi)

@@ -9,16 +9,11 @@ import numpy as np
 from viewsphere.labels.shared.ids import by_table
 from viewsphere.labels.shared.point_checks import exact_depth
 from viewsphere.labels.shared.spec import Array, Picture
-from viewsphere.model.annotations.classes import FIRST_THING, SKY, STUFF, STUFF_IDS, class_colors, thing_class
+from viewsphere.model.annotations.classes import FIRST_THING, SKY, STUFF, class_colors, thing_class
 from viewsphere.model.sample import Sample
 
 KEY = tuple(STUFF.items())
 """The meaning of each colour of stuff."""
-
-
-def class_names() -> str:
-    """The names of stuff with their ids, in words."""
-    return ", ".join(f"{i} {name}" for name, i in STUFF_IDS.items())
 
 
 def with_classes(classes: Array, ids: Mapping[int, int]) -> Array:

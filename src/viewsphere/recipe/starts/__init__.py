@@ -4,12 +4,8 @@ script.
 
 from __future__ import annotations
 
-import re
-from collections.abc import Sequence
 from importlib.resources import files
 from typing import NamedTuple
-
-from viewsphere.validation.quantity import quantity
 
 FIRST = "poses"
 """The default kind."""
@@ -41,35 +37,3 @@ class FoundFiles(NamedTuple):
     pattern: str
     number: int
     category: str
-
-
-def with_models(text: str, name: str, found: Sequence[FoundFiles]) -> str:
-    """The text of a starting recipe, named `name`, with these files instead of the zoo's models."""
-    entries = "".join(
-        f"  - source: {_quoted(one.pattern)}    # {quantity(one.number, 'file')}\n    category: {_quoted(one.category)}\n"
-        for one in found
-    )
-    hints = (
-        "    # unit: mm                 # m, cm, mm, in, ft or the metres in one unit\n"
-        "    # up: +z                   # the axis that points up ...\n"
-        "    # forward: -y              # ... and the one that the front faces; viewsphere inspect FILE shows both\n"
-    )
-    text = re.sub(r"^name: \S+", lambda _: f"name: {_quoted(name)}", text, count=1, flags=re.MULTILINE)
-    models = f"models:\n{entries}{hints}".rstrip("\n")
-    text = re.sub(r"^models:.*?(?=\n\n)", lambda _: models, text, count=1, flags=re.DOTALL | re.MULTILINE)
-    text = re.sub(r"^(viewpoints:)  .*$", r"\1", text, count=1, flags=re.MULTILINE)
-    fill = "  distance: {fill: 0.6}        # the share of the picture that the model takes; or metres"
-    text = re.sub(r"^  distance: [\d[].*$", fill, text, count=1, flags=re.MULTILINE)
-    few = sum(one.number for one in found) < FEWEST
-    if few:
-        text = re.sub(r"^splits: \{by: model.*$", BY_FRAME, text, count=1, flags=re.MULTILINE)
-        text = re.sub(r"^(  objects: .*)$", rf"\1\n{REPEAT}", text, count=1, flags=re.MULTILINE)
-    return text
-
-
-def _quoted(text: str) -> str:
-    """The text as YAML in a line, in quotes where it needs them."""
-    import yaml
-
-    plain = re.fullmatch(r"[A-Za-z_][\w ./-]*", text) and yaml.safe_load(text) == text
-    return text if plain else yaml.safe_dump(text, default_style='"', width=10_000).strip()

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import AbstractContextManager, ExitStack, closing
 from pathlib import Path
 
+import xxhash
 from pydantic import JsonValue
 
 from viewsphere import plugins
@@ -17,8 +18,9 @@ from viewsphere.run.exports.scope import refuse, scope_of
 from viewsphere.run.exports.writable import writable
 from viewsphere.run.progress import Listener, Progress, null_listener
 from viewsphere.store import Choice, Dataset, located, new_folder
-from viewsphere.store.credits import credits_digest
+from viewsphere.store.credits import credits_text
 from viewsphere.store.shots.checksums import write_checksums, written_credits, written_frames, written_least, written_options
+from viewsphere.store.shots.records import ModelInfo
 from viewsphere.validation.quantity import quantity
 
 
@@ -123,7 +125,7 @@ def write(dataset: Dataset, formats: Entries, tell: Listener = null_listener, wo
     for entry, folder in formats:
         spec = plugins.load(FormatSpec, entry.name)
         own = None if spec.keeps_all_objects else least
-        credited = credits_digest(dataset.models) if spec.names_credits else None
+        credited = _credits_digest(dataset.models) if spec.names_credits else None
         write_checksums(folder, entry.whole().options, own, credited, total)
     tell(Progress("exports", total, total))
     return tuple(notes)
@@ -143,7 +145,7 @@ def is_out_of_date(name: str, dataset: Dataset, least: float | None) -> bool:
     spec, folder = plugins.load(FormatSpec, name), dataset.root / name
     if written_frames(folder) not in (None, len(dataset)) or (not spec.keeps_all_objects and written_least(folder) != least):
         return True
-    return spec.names_credits and written_credits(folder) != credits_digest(dataset.models)
+    return spec.names_credits and written_credits(folder) != _credits_digest(dataset.models)
 
 
 def _check_choice(dataset: Dataset, is_own: bool) -> None:
@@ -152,3 +154,9 @@ def _check_choice(dataset: Dataset, is_own: bool) -> None:
         raise UserError("--output: expected another folder than the data set's, beside --models or --frames; found none")
     if dataset.choice.is_some and not len(dataset):
         raise UserError(f"{dataset.root}: expected finished frames that --models and --frames fit; found none")
+
+
+def _credits_digest(models: Iterable[ModelInfo]) -> str | None:
+    """Digest of the file's text (xxh128, hexadecimal); None if no credit is known."""
+    text = credits_text(models)
+    return xxhash.xxh3_128(text.encode()).hexdigest() if text else None

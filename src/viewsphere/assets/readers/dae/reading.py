@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
+from xml.etree.ElementTree import Element
 
 import numpy as np
 
@@ -15,7 +16,7 @@ from viewsphere.assets.paths.folder import ModelFolder
 from viewsphere.assets.primitive import FileFacts, Float, Primitive, assemble
 from viewsphere.assets.readers.dae.material import DaeMaterials, is_double_sided
 from viewsphere.assets.readers.dae.mesh import DaeFaces, numbers_of, read_mesh
-from viewsphere.assets.readers.shared.instances import check_instances, dae_references
+from viewsphere.assets.readers.shared.instances import check_instances
 from viewsphere.assets.readers.shared.smoothing import creased
 from viewsphere.assets.readers.shared.transform import moved
 from viewsphere.assets.readers.shared.xml_tree import parse_xml
@@ -33,7 +34,7 @@ def read_dae(folder: ModelFolder) -> tuple[Mesh, FileFacts]:
     root = parse_xml(folder, data)
     if root.tag != "COLLADA":
         raise folder.error(f"expected a COLLADA file, found XML of <{root.tag[:40]}>")
-    check_instances(folder, dae_references(root))
+    check_instances(folder, _dae_references(root))
     materials = DaeMaterials(folder, root)
     pieces = list(_Scene(folder, root, materials).pieces())
     kept = with_alpha_modes(folder, pieces, materials.kept or [Material()], materials.stated)
@@ -200,3 +201,26 @@ def _looking(eye: Float, interest: Float, up: Float) -> Float:
     side = np.cross(up, back)
     side = side / (math.sqrt(float((side * side).sum())) or 1.0)
     return np.column_stack([side, np.cross(back, side), back, eye])
+
+
+def _dae_references(root: Element) -> dict[str, list[str]]:
+    """For each node of a COLLADA file, its child nodes and the nodes that it instantiates; the parent of the scenes is `""`."""
+    # Nodes are identified by number, because files with duplicate ids are common.
+    scenes, library = "", "library"
+    references: dict[str, list[str]] = {scenes: [], library: []}
+    by_url: dict[str, str] = {}
+    waiting = [(root, library)]
+    while waiting:
+        element, owner = waiting.pop()
+        if element.tag == "instance_node":
+            references[owner].append(element.get("url", ""))
+        elif element.tag == "visual_scene":
+            owner = scenes
+        elif element.tag == "node":
+            name = f"node {len(references)}"
+            by_url.setdefault(f"#{element.get('id')}", name)
+            references[name] = []
+            references[owner].append(name)
+            owner = name
+        waiting += ((child, owner) for child in reversed(element))
+    return {name: [by_url.get(other, other) for other in inner] for name, inner in references.items()}

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from xml.etree.ElementTree import Element
 
 from viewsphere.assets.paths.folder import ModelFolder
 
@@ -43,26 +42,3 @@ def check_instances(folder: ModelFolder, references: Mapping[str, Sequence[str]]
         raise folder.error("an object is part of itself: expected a tree, found a cycle")
     folder.check("MAX_NESTING", depth, "objects within one another")
     folder.check("MAX_INSTANCES", count, "instances")
-
-
-def dae_references(root: Element) -> dict[str, list[str]]:
-    """For each node of a COLLADA file, its child nodes and the nodes that it instantiates; the parent of the scenes is `""`."""
-    # Nodes are identified by number, because files with duplicate ids are common.
-    scenes, library = "", "library"
-    references: dict[str, list[str]] = {scenes: [], library: []}
-    by_url: dict[str, str] = {}
-    waiting = [(root, library)]
-    while waiting:
-        element, owner = waiting.pop()
-        if element.tag == "instance_node":
-            references[owner].append(element.get("url", ""))
-        elif element.tag == "visual_scene":
-            owner = scenes
-        elif element.tag == "node":
-            name = f"node {len(references)}"
-            by_url.setdefault(f"#{element.get('id')}", name)
-            references[name] = []
-            references[owner].append(name)
-            owner = name
-        waiting += ((child, owner) for child in reversed(element))
-    return {name: [by_url.get(other, other) for other in inner] for name, inner in references.items()}

@@ -37,12 +37,6 @@ def motion(world_from_camera: Float, center: Float, where: str) -> Extrinsics:
     return Extrinsics(_rows(rotation.T), _row(center))
 
 
-def from_matrix(values: Sequence[float], where: str) -> Extrinsics:
-    """A camera from the 12 (or 16) numbers of its camera-to-world matrix, row by row, OpenCV axes."""
-    matrix = np.array(values[:12], np.float64).reshape(3, 4)
-    return motion(matrix[:, :3], matrix[:, 3], where)
-
-
 def nearest_rotation(matrix: Float) -> Float | None:
     """The rotation nearest to an approximate rotation matrix; None for a mirror image or a singular matrix.
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import csv
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +11,7 @@ import numpy as np
 from viewsphere.composing.tables import known_columns
 from viewsphere.composing.viewpoints.pose_files.entries import Extrinsics, Orbit, PoseFile
 from viewsphere.composing.viewpoints.pose_files.lines import counted, number, read_lines, read_text
-from viewsphere.composing.viewpoints.pose_files.motions import from_matrix, from_quaternion, motion
+from viewsphere.composing.viewpoints.pose_files.motions import from_quaternion, motion
 from viewsphere.errors import RecipeError
 from viewsphere.validation.errors import nearest
 
@@ -82,7 +82,7 @@ def _read_kitti(path: Path) -> PoseFile:
 
     The world is the first camera's: y points down.
     """
-    entries = tuple(from_matrix(counted(words, 12, f"{path}:{line}"), f"{path}:{line}") for line, words in read_lines(path))
+    entries = tuple(_from_matrix(counted(words, 12, f"{path}:{line}"), f"{path}:{line}") for line, words in read_lines(path))
     return PoseFile(entries, up="-y")
 
 
@@ -93,3 +93,9 @@ READERS: dict[str, Callable[[Path], PoseFile]] = {
     "kitti": _read_kitti,
 }
 """Functions that read a file, by format; they raise RecipeError, with file and line."""
+
+
+def _from_matrix(values: Sequence[float], where: str) -> Extrinsics:
+    """A camera from the 12 (or 16) numbers of its camera-to-world matrix, row by row, OpenCV axes."""
+    matrix = np.array(values[:12], np.float64).reshape(3, 4)
+    return motion(matrix[:, :3], matrix[:, 3], where)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 import numpy as np
@@ -31,14 +31,6 @@ def pose_of(matrix: ArrayLike) -> Pose:
     """A motion (4, 4) or (3, 4) in the form used by shots."""
     a, b, c = ((x, y, z, w) for x, y, z, w in np.asarray(matrix, np.float64)[:3].tolist())
     return a, b, c, IDENTITY[3]
-
-
-def nearest_up(shots: Sequence[ListedShot]) -> Axis:
-    """The axis of the world that is nearest to the cameras' mean up direction."""
-    up = -np.array([np.array(shot.world_from_camera)[:3, 1] for shot in shots]).reshape(-1, 3).sum(axis=0)
-    axes: tuple[tuple[Axis, Axis], ...] = (("+x", "-x"), ("+y", "-y"), ("+z", "-z"))
-    largest = int(np.abs(up).argmax())
-    return axes[largest][int(up[largest] < 0)]
 
 
 def cameras_again(

@@ -21,26 +21,10 @@ STEPS, ZERO = 64, 2**15
 """Steps of KITTI's flow in a pixel, and the number for no motion."""
 
 
-def tagged(array: NDArray[Any]) -> bytes:
-    """Numbers (H, W) or (H, W, 2) after Middlebury's tag, width and height, as little-endian float32, row by row."""
-    height, width = array.shape[:2]
-    return FLO_TAG + np.array([width, height], "<i4").tobytes() + np.ascontiguousarray(array, "<f4").tobytes()
-
-
 def _pfm(array: NDArray[Any]) -> bytes:
     """A PFM file of numbers (H, W) or (H, W, 3): little-endian float32, the lowest row first."""
     head = f"{'PF' if array.ndim == 3 else 'Pf'}\n{array.shape[1]} {array.shape[0]}\n-1.0\n"
     return head.encode() + np.ascontiguousarray(array[::-1], "<f4").tobytes()
-
-
-def flo_file(sample: Sample, channel: str = "flow") -> Coded:
-    """A channel of flow as .flo, with 1e10 for unknown flow."""
-
-    def make() -> bytes:
-        flow = sample.channels[channel]
-        return tagged(np.where(np.isnan(flow), UNKNOWN, flow))
-
-    return Coded(sample.index, f"{channel}.flo", make)
 
 
 def flow_pfm(sample: Sample, channel: str, nothing: float = 0.0) -> Coded:
@@ -61,16 +45,6 @@ def map_pfm(sample: Sample, channel: str, nothing: float = 0.0) -> Coded:
         return _pfm(np.where(np.isnan(array), np.float32(nothing), array))
 
     return Coded(sample.index, f"{channel} {nothing}.pfm", make)
-
-
-def flow_png(flow: NDArray[np.float32], valid: NDArray[np.bool_]) -> bytes:
-    """KITTI's flow (H, W, 2) as 16-bit RGB: right and down in steps of 1/64 pixel from 2^15, and 1 if valid.
-
-    Flow beyond 512 pixels cannot be expressed and is invalid. Invalid flow is 0, 0, 0.
-    """
-    steps = np.rint(np.where(valid[..., None], flow.astype(np.float64), 0) * STEPS) + ZERO
-    has = valid & ((steps >= 0) & (steps <= 65535)).all(axis=-1)
-    return encode_png(np.where(has[..., None], np.dstack((steps, np.ones(has.shape))), 0).astype(np.uint16))
 
 
 def steps_png(numbers: NDArray[Any], valid: NDArray[np.bool_]) -> bytes:

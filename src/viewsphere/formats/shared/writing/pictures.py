@@ -82,9 +82,3 @@ def depth_steps(sample: Sample, metres: float, nothing: int = 0, most: int = 655
     seen = np.isfinite(depth) & (depth > 0)
     steps = np.clip(np.rint(np.where(seen, depth, metres) / metres), 1, most)
     return np.where(seen, steps, nothing).astype(np.uint16)
-
-
-def ids_png(sample: Sample, bits: int = 8) -> Coded:
-    """The ids of objects, 0 for none, in a grey PNG of 8 or 16 bits."""
-    kind = np.uint8 if bits == 8 else np.uint16
-    return Coded(sample.index, f"ids {bits}.png", lambda: encode_png(sample.channels["instances"].astype(kind)))

@@ -7,7 +7,6 @@ A format's module defines a subclass of `Tree` and derives its functions from it
 
 from __future__ import annotations
 
-import json
 import shutil
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Collection, Generator, Iterable, Iterator, Mapping
@@ -60,11 +59,6 @@ def line(path: str, *values: object) -> Piece:
 def item(path: str, value: Any, section: str = "") -> Piece:
     """An item of a JSON list."""
     return Piece(path, json_bytes(value), section, b",\n")
-
-
-def member(path: str, key: str, value: Any, section: str = "") -> Piece:
-    """A key of a JSON object, and its value."""
-    return Piece(path, json.dumps(key).encode() + b":" + json_bytes(value), section, b",\n")
 
 
 Layout = Iterable[bytes | str]

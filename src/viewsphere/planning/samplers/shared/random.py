@@ -6,16 +6,16 @@ Scene k depends only on the seed, its name and the models, not on the number of 
 from __future__ import annotations
 
 from collections import Counter, defaultdict
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import lru_cache, partial
+from heapq import nsmallest
 
-from viewsphere.composing.cast import balanced, mixed
 from viewsphere.composing.composition import BoxOf, still
 from viewsphere.composing.layouts import Laid, laid, remembered_as
 from viewsphere.composing.placing import Piece, Room, footprint
 from viewsphere.composing.redraws import SAME_MODELS, fewer, least_objects, redraw_names, redraws_place
 from viewsphere.composing.scene.scenery import draw_names, place_surfaces, scenery_key
-from viewsphere.composing.seeds import generator, share, shares
+from viewsphere.composing.seeds import Names, generator, share, shares
 from viewsphere.errors import RecipeError
 from viewsphere.geometry.box3d import Box3d
 from viewsphere.limits import limits
@@ -63,11 +63,11 @@ def scene_cast(context: SamplingContext, subject: str) -> tuple[ModelSpec, ...]:
     models = _models_for(context, _group(context, subject))
     names = (subject, *redraw_names(context.redraw, SAME_MODELS))
     if entry.balance == "models":
-        return mixed(recipe.seed, models, _size(recipe, subject, context.redraw), names, entry.repeat)
+        return _mixed(recipe.seed, models, _size(recipe, subject, context.redraw), names, entry.repeat)
     cast: list[ModelSpec] = []
     for category, count in _categories(context.root)[subject]:
         specs_of_category = tuple(spec for spec in models if spec.category == category)
-        cast += mixed(recipe.seed, specs_of_category, count, names, entry.repeat)
+        cast += _mixed(recipe.seed, specs_of_category, count, names, entry.repeat)
     return tuple(sorted(cast, key=lambda spec: share(recipe.seed, "slot", subject, spec.key)))
 
 
@@ -97,7 +97,7 @@ def _categories(context: SamplingContext) -> dict[str, tuple[tuple[str, int], ..
     categories: dict[str, tuple[tuple[str, int], ...]] = {}
     for group, subjects in groups.items():
         there = Counter(spec.category for spec in _models_for(context, group))
-        categories |= balanced(recipe.seed, {name: _size(recipe, name) for name in subjects}, there, repeat)
+        categories |= _balanced(recipe.seed, {name: _size(recipe, name) for name in subjects}, there, repeat)
     return categories
 
 
@@ -168,7 +168,7 @@ def _distractors(context: SamplingContext, subject: str) -> tuple[ModelSpec, ...
         return ()
     count = drawn(entry.distractors, lambda path: generator(context.recipe.seed, *path, subject), ("scenes", "distractors"))
     names = (subject, "distractors", *redraw_names(context.redraw, SAME_MODELS))
-    return mixed(context.recipe.seed, models, count, names, repeat=True)
+    return _mixed(context.recipe.seed, models, count, names, repeat=True)
 
 
 def scene_around(context: SamplingContext, subject: str, pose: str | None, box_of: BoxOf) -> tuple[Thing, ...]:
@@ -282,3 +282,39 @@ def _shares(context: SamplingContext) -> dict[str, float]:
     if not any(isinstance(part, tuple) for part in splits.shares.values()):
         return shared(splits)
     return {name: count / context.models for name, count in sorted(Counter(context.dealt_splits.values()).items())}
+
+
+def _mixed(seed: int, models: Sequence[ModelSpec], count: int, names: Names, repeat: bool) -> tuple[ModelSpec, ...]:
+    """`count` of the models for one scene, each at most once unless they may `repeat`.
+
+    The models with the lowest hashes are chosen: another model in the recipe changes only the places that it gets, at most one
+    without repeats.
+    """
+    if not repeat:
+        return tuple(nsmallest(count, models, key=lambda spec: (share(seed, "cast", *names, spec.key), spec.key)))
+    return tuple(
+        min(models, key=lambda spec: (share(seed, "cast", *names, str(slot), spec.key), spec.key)) for slot in range(count)
+    )
+
+
+def _balanced(
+    seed: int, sizes: Mapping[str, int], models: Mapping[str, int], repeat: bool
+) -> dict[str, tuple[tuple[str, int], ...]]:
+    """Return the number of objects of each category in each scene.
+
+    Over the scenes up to any one, the categories have equal numbers, within one object, while they have enough models.
+    `sizes`: the number of objects of each scene, in scene order. `models`: the number of models of each category.
+    A model appears at most once in a scene unless `repeat` is set. A scene's result depends on earlier scenes, never on later
+    ones.
+    """
+    had = dict.fromkeys(models, 0)
+    members: dict[str, tuple[tuple[str, int], ...]] = {}
+    for scene, size in sizes.items():
+        counts, order = Counter[str](), sorted(models, key=lambda name: share(seed, "category", scene, name))
+        for _ in range(size):
+            free = [name for name in order if repeat or counts[name] < models[name]]
+            least = min(free, key=lambda name: (had[name], counts[name]))
+            had[least] += 1
+            counts[least] += 1
+        members[scene] = tuple(counts.items())
+    return members

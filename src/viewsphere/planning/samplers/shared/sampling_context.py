@@ -36,9 +36,9 @@ from viewsphere.model.shot import Shot
 from viewsphere.model.thing import Thing, TimeStep
 from viewsphere.planning.clips import shown_steps
 from viewsphere.planning.engine_digest import engine_options
-from viewsphere.planning.splits import dealt, hashed
+from viewsphere.planning.splits import dealt, drawn_split, shared
 from viewsphere.recipe.draws import drawn
-from viewsphere.recipe.recipe import Recipe
+from viewsphere.recipe.recipe import Recipe, Splits
 
 
 @dataclass(frozen=True, eq=False)
@@ -202,7 +202,7 @@ class SamplingContext(Sendable):
                 names = ("place", *(draw_names(place.draw, subject, self.pose_list.name(pose)) if place else ()))
             case _:
                 names = (subject, self.pose_list.name(pose))
-        return hashed(splits, self.recipe.lasting_seed, names)
+        return _hashed(splits, self.recipe.lasting_seed, names)
 
     def scene(self, subject: str, pose: str) -> Scene:
         """Light and ground of a subject's frames, and the .blend file around them; `pose` is a pose's name."""
@@ -321,3 +321,8 @@ def lens(recipe: Recipe, views: Poses | None) -> Intrinsics:
     if views is None or views.intrinsics is None:
         raise RecipeError("camera.of_viewpoints: expected a file of poses that names a lens; found none: give fov_deg or K")
     return views.intrinsics
+
+
+def _hashed(splits: Splits, seed: int, names: tuple[str, ...]) -> str:
+    """The split for these names: each split gets about its share of all names, and no name affects the others."""
+    return drawn_split(shared(splits), seed, names)
