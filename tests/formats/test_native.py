@@ -141,7 +141,7 @@ def test_equal_bytes(exported, tmp_path):
 
 def test_large_data_sets_have_numbered_folders(exported, monkeypatch, tmp_path):
     dataset, _, _ = exported
-    monkeypatch.setattr("viewsphere.formats.native.entries.FOLDER_SIZE", 2)
+    monkeypatch.setattr("viewsphere.formats.native.writing.FOLDER_SIZE", 2)
     value = export(dataset, tmp_path / "large")
     for folder in tmp_path.rglob("*"):
         assert not folder.is_dir() or folder.name == "large" or len(list(folder.iterdir())) <= 3

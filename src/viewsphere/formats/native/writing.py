@@ -19,7 +19,7 @@ from viewsphere.plugins.format import Remark
 from viewsphere.scratch import temporary
 from viewsphere.store import Dataset
 
-_FOLDER_SIZE = 10_000
+FOLDER_SIZE = 10_000
 """Largest number of entries in a folder: file managers and object stores list more of them slowly."""
 
 OPENED: tuple[Where, ...] = (
@@ -181,7 +181,7 @@ def _object_name(dataset: Dataset, sample: Sample, o: ObjectAnnotation) -> str:
 
 def _pose_folder(dataset: Dataset, sample: Sample) -> str:
     index = sample.pose.index
-    group = f"Poses-{index // _FOLDER_SIZE:04d}/" if dataset.plan.poses > _FOLDER_SIZE - 2 else ""
+    group = f"Poses-{index // FOLDER_SIZE:04d}/" if dataset.plan.poses > FOLDER_SIZE - 2 else ""
     return f"{group}Pose-{index}"
 
 
@@ -189,7 +189,7 @@ def _group(dataset: Dataset, sample: Sample) -> str:
     """Sub-folder in a pose's folders, empty unless they would hold too many files."""
     plan = dataset.plan
     number, count = (n * dataset.max_objects // max(plan.poses, 1) for n in (sample.index, plan.frames))
-    return f"{number // _FOLDER_SIZE:04d}/" if count > _FOLDER_SIZE else ""
+    return f"{number // FOLDER_SIZE:04d}/" if count > FOLDER_SIZE else ""
 
 
 def _pose(dataset: Dataset, sample: Sample) -> dict[str, Any]:
