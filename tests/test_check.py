@@ -170,7 +170,7 @@ def test_an_export_s_proof_that_breaks_off(dataset, monkeypatch, error, message)
 def test_pictures_alone_pass_without_the_proof_of_surfaces(tmp_path):
     report = check(make(tmp_path, channels=("rgb",)))
     assert report.ok, report.findings
-    assert report.not_run["surface"] == "needs the channels depth and instances"
+    assert report.not_run["surface"] == "needs the channels instances and depth, or depth_ray"
 
 
 @pytest.mark.slow

@@ -6,6 +6,7 @@ Light has one unit: a white Lambert surface that receives an irradiance of pi ha
 from __future__ import annotations
 
 from collections.abc import Mapping
+from hashlib import blake2b
 from typing import Annotated, Any, Literal, cast
 
 from pydantic import BeforeValidator, ConfigDict, Field, JsonValue, model_validator
@@ -253,6 +254,13 @@ class Finish(Frozen):
     smoother: Smoother = Smoother.of_defaults()
     view: ViewTransform = ViewTransform.of_defaults()
     effects: Effects = Effects.of_defaults()
+
+    def with_noise_of(self, sensor: str) -> Finish:
+        """The same finish, with noise that also follows from a sensor's name; without noise it is unchanged."""
+        if not self.effects.seed:
+            return self
+        seed = int.from_bytes(blake2b(f"{self.effects.seed}:{sensor}".encode(), digest_size=4).digest(), "little")
+        return self.model_copy(update={"effects": self.effects.model_copy(update={SEED: seed})})
 
     def with_background(self, transparent: bool) -> Finish:
         """The same finish, with its background, or transparent behind the scene."""

@@ -172,9 +172,13 @@ class Shot(Frozen):
         then = now.model_copy(update={"world_from_rig": pose})
         return self.model_copy(update={"instants": (then,)}).camera(0, sensor)
 
-    def finish(self, instant: int) -> Finish:
-        """Return the finish that turns light into a picture at an instant."""
-        return self.instants[instant].finish or self.scene.finish
+    def finish(self, instant: int, sensor: int = 0) -> Finish:
+        """The finish that turns the light of a sensor into a picture at an instant, both counted from 0 in the shot.
+
+        The rig's first sensor has the instant's noise; the name of every other sensor gives it noise of its own.
+        """
+        finish = self.instants[instant].finish or self.scene.finish
+        return finish.with_noise_of(self.rig.sensors[sensor].name) if sensor else finish
 
     @property
     def stage_key(self) -> str:

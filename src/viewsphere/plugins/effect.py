@@ -53,7 +53,7 @@ class EffectSpec(Spec):
     )
     is_noisy: bool = Field(
         default=False,
-        description="whether it is random: `context.seed` differs in every frame, and all randomness comes from it",
+        description="whether it is random: `context.seed` differs in every frame and sensor, and all randomness comes from it",
     )
     shows_motion: bool = Field(
         default=False, description="whether it blurs as motion does; recipes with an open shutter refuse it, as they blur, too"

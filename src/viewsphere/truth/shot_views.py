@@ -275,7 +275,7 @@ class NeighbourViews:
     @property
     def finish(self) -> Finish:
         """The finish that turns light into the sample's picture."""
-        return self.views.shot.finish(self.instant)
+        return self.views.shot.finish(self.instant, self.sensor_number)
 
     @property
     def sensor(self) -> Sensor:

@@ -12,7 +12,7 @@ import numpy as np
 
 from viewsphere.check.failure import failure
 from viewsphere.check.frames.comparing import FRAME_PROOFS
-from viewsphere.check.frames.rays import RayCaster
+from viewsphere.check.frames.rays import RayCaster, depth_of
 from viewsphere.check.frames.recomputed import CONTRADICTED, Recomputed, rows_of
 from viewsphere.check.frames.recomputed_labels import RecomputedLabels
 from viewsphere.check.frames.repainted import Repainted
@@ -104,7 +104,7 @@ class _Proofs:
                     yield name, [message]
             except Exception as error:
                 yield "models", [failure("models and shots from which labels can be computed", error)]
-        if self._caster and all(o.is_placed for o in sample.objects) and {"depth", "instances"} <= sample.files.keys():
+        if self._caster and all(o.is_placed for o in sample.objects) and depth_of(sample.files):
             yield "surface", _carried_out(partial(self._caster.off_surface, sample))
 
     def _by_recipe(self, position: int, sample: Sample) -> Iterator[tuple[str, list[str]]]:
@@ -123,8 +123,8 @@ class _Proofs:
             yield "repaint", messages
 
     def _make_caster(self) -> RayCaster | None:
-        if not {"depth", "instances"} <= set(self._dataset.plan.channels):
-            self._not_run["surface"] = "needs the channels depth and instances"
+        if depth_of(self._dataset.plan.channels) is None:
+            self._not_run["surface"] = "needs the channels instances and depth, or depth_ray"
             return None
         try:
             return RayCaster(self._dataset, self._scenery)

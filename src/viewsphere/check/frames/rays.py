@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Container, Iterator
 from dataclasses import dataclass
 from importlib.util import find_spec
 from io import BytesIO
@@ -63,6 +63,26 @@ class _Target:
     fronts: Float
 
 
+@dataclass(frozen=True, eq=False)
+class _Depth:
+    """The stored depth (H, W) of a frame, metres, rounded by at most `rounded`; `rays` (H, W, 3) of its pixels, and `scale`
+    (H, W), the depth of the point at the end of each ray.
+    """
+
+    rays: Float
+    stored: NDArray[np.float32]
+    scale: Float
+    rounded: float
+
+
+def depth_of(channels: Container[str]) -> str | None:
+    """The channel whose distances rays prove: `depth`, or `depth_ray` of lenses without it; None without either, or without
+    the instances.
+    """
+    found = next((name for name in ("depth", "depth_ray") if name in channels), None)
+    return found if "instances" in channels else None
+
+
 class RayCaster:
     """Casts rays at a data set's scenes; the last one is kept, because frames of one scene follow one another.
 
@@ -86,7 +106,7 @@ class RayCaster:
         self._complete = True
 
     def off_surface(self, sample: Sample) -> Iterator[str]:
-        """Yield the contradictions between stored depth and instances, and the models as Embree sees them.
+        """Yield the contradictions between stored depth (see `depth_of`) and instances, and the models as Embree sees them.
 
         Each point must be on the right object, and no opaque surface may be in front of it. A point of the background must be
         on scenery or the ground, which is at the lowest point of all (or lower, if the shot sets this). Empty pixels must show
@@ -95,28 +115,31 @@ class RayCaster:
         if not sample.objects:
             return
         self._build(sample)
-        instances, depth = sample.channels["instances"], sample.channels["depth"]
+        name = depth_of(sample.files)
+        assert name is not None
+        instances, stored = sample.channels["instances"], sample.channels[name]
         rays = pixel_rays(sample.camera.intrinsics)
-        step = depth_step(self._dataset.read(sample.files["depth"])) / 2
-        castable = (np.abs(rays[..., 2]) > 1e-3) & ((step == 0) | np.isinf(depth) | (depth < (MOST_STEPS - 0.5) * 2 * step))
-        yield from self._off(
-            sample, rays, step, castable & (instances > 0) & np.isfinite(depth), "points are not on the exported model"
-        )
+        scale = rays[..., 2] if name == "depth" else np.linalg.norm(rays, axis=-1)
+        step = depth_step(self._dataset.read(sample.files[name])) / 2
+        castable = (np.abs(scale) > 1e-3) & ((step == 0) | np.isinf(stored) | (stored < (MOST_STEPS - 0.5) * 2 * step))
+        depth = _Depth(rays, stored, scale, step)
+        of_objects = castable & (instances > 0) & np.isfinite(stored)
+        yield from self._off(sample, depth, of_objects, "points are not on the exported model")
         if self._complete:
             rest = castable & (instances == 0)
-            yield from self._off(sample, rays, step, rest, "points of the background are not where scenery and ground are")
+            yield from self._off(sample, depth, rest, "points of the background are not where scenery and ground are")
 
-    def _off(self, sample: Sample, rays: Float, rounded: float, asked: NDArray[np.bool_], what: str) -> Iterator[str]:
-        """Findings at the selected pixels, whose depth was rounded by at most `rounded` metres."""
+    def _off(self, sample: Sample, depth: _Depth, asked: NDArray[np.bool_], what: str) -> Iterator[str]:
+        """Findings at the selected pixels."""
         rows, columns = np.nonzero(asked)
         if not len(rows):
             return
         chosen = np.linspace(0, len(rows) - 1, min(PIXELS, len(rows))).astype(int)
         rows, columns = rows[chosen], columns[chosen]
-        ids, depth = sample.channels["instances"][rows, columns], sample.channels["depth"][rows, columns]
-        directions = rays[rows, columns] @ sample.camera.R
-        s = depth / rays[rows, columns, 2]
-        slack = TOLERANCE * np.abs(np.where(np.isfinite(s), s, 0.0)) + rounded / np.abs(rays[rows, columns, 2])
+        ids, scale = sample.channels["instances"][rows, columns], depth.scale[rows, columns]
+        directions = depth.rays[rows, columns] @ sample.camera.R
+        s = depth.stored[rows, columns] / scale
+        slack = TOLERANCE * np.abs(np.where(np.isfinite(s), s, 0.0)) + depth.rounded / np.abs(scale)
         eye = self._eyes(sample)[rows, columns]
         start = np.where(np.isfinite(s), s - slack, 0.0)
         found, owner = self._nearest(eye + start[:, None] * directions, directions)
@@ -128,7 +151,7 @@ class RayCaster:
             off = np.abs(height - self._lowest)
             on_ground = np.isfinite(s) & (off <= slack * np.maximum(1.0, np.abs(directions[:, 2])))
         there |= (ids == 0) & on_ground & (not self._is_in_ground(sample.camera))
-        there |= np.isinf(s) & (ids == 0) & ~self._meets_ground(eye, directions, rays[rows, columns, 2] > 0)
+        there |= np.isinf(s) & (ids == 0) & ~self._meets_ground(eye, directions, scale > 0)
         wrong = ~there | (first < np.where(np.isfinite(s), s - slack, np.inf))
         if wrong.sum() > max(2, OUTLIERS * len(s)):
             i = int(np.flatnonzero(wrong)[0])

@@ -100,8 +100,7 @@ class RasterStage:
                 and not self.shot.scene.weather
                 and Blur(self.arrangements, instant, sensor).count(self.at(instant), visibility) == 1
             ):
-                camera = self.shot.camera(instant, sensor)
-                painted |= self._finished(instant, camera, visibility, together[0])  # from the light that was split
+                painted |= self._finished(instant, sensor, visibility, together[0])  # from the light that was split
         if not set(names).isdisjoint(MATERIAL_PASSES):
             made = materials(self.baked(instant), self.shot.camera(instant, sensor), visibility)
             painted |= dict(zip(MATERIAL_PASSES, made.T.reshape(2, *visibility.triangle.shape).copy(), strict=True))
@@ -113,7 +112,7 @@ class RasterStage:
     def _light(self, instant: int, sensor: int, visibility: Visibility, names: Collection[str]) -> dict[str, Float32]:
         """Return all `LIGHT_PASSES`, with the sky if the picture has it; (H, W, 3) each."""
         camera, is_lit = self.shot.camera(instant, sensor), "shading" in names or "residual" in names
-        finish = self.shot.finish(instant).with_background(lacks_background(names))
+        finish = self.shot.finish(instant, sensor).with_background(lacks_background(names))
         has_sky = shows_sky(finish.background)
         radiance = self._canvas(camera.width * camera.height)
         split = np.zeros((len(radiance), 9 if is_lit else 6), np.float32)
@@ -136,17 +135,18 @@ class RasterStage:
         """Pictures of one light: `rgba`, or any of the others."""
         camera, background = (
             self.shot.camera(instant, sensor),
-            self.shot.finish(instant).with_background("rgba" in names).background,
+            self.shot.finish(instant, sensor).with_background("rgba" in names).background,
         )
         radiance = self._canvas(camera.width * camera.height)
         self._paint(instant, sensor, camera, visibility, shows_sky(background), radiance)
         picture, seconds = radiance.reshape(camera.height, camera.width, 4), self.shot.instants[instant].seconds
         fall_in(self.shot.scene, picture, camera, seconds, visibility.inverse_depth)
-        return self._finished(instant, camera, visibility, names)
+        return self._finished(instant, sensor, visibility, names)
 
-    def _finished(self, instant: int, camera: Camera, visibility: Visibility, names: Sequence[str]) -> dict[str, NDArray[Any]]:
+    def _finished(self, instant: int, sensor: int, visibility: Visibility, names: Sequence[str]) -> dict[str, NDArray[Any]]:
         """Pictures made from the light that was painted last: `rgba`, or any of the others."""
-        finish = self.shot.finish(instant).with_background("rgba" in names)
+        camera = self.shot.camera(instant, sensor)
+        finish = self.shot.finish(instant, sensor).with_background("rgba" in names)
         background = display_background(finish.background, camera.width, camera.height)
         radiance = self._canvas(camera.width * camera.height)
         shape, focus = (camera.height, camera.width, 4), np.array(self.shot.instants[instant].focus)

@@ -49,7 +49,9 @@ class EffectContext:
 
     @property
     def seed(self) -> int:
-        """The seed of the frame's noise, which all noisy effects share: make a generator of it and of the effect's name."""
+        """The seed of the noise of one sensor's frame, which all noisy effects share: make a generator of it and of the
+        effect's name.
+        """
         if self._seed is None:
             raise PluginError(
                 f"effect {self._name}: its `apply` reads `context.seed`, which is for noisy effects: set `is_noisy` to True"

@@ -226,7 +226,7 @@ def render_sample(
         requested=shot.annotations,
         extra=sample_values(context, objects),
         options=shot.labels,
-        finish=shot.finish(instant),
+        finish=shot.finish(instant, sensor),
     )
 
 

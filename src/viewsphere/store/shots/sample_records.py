@@ -199,7 +199,7 @@ class ShotRecords:
             requested=self.shot.annotations,
             extra=_extra(self.shot.annotations, record.get("extra", {})),
             options=self.shot.labels,
-            finish=self.shot.finish(instant),
+            finish=self.shot.finish(instant, sensor),
         )
 
     def _objects(self, records: list[dict[str, Any]], instant: int, camera: Camera) -> Iterator[ObjectAnnotation]:

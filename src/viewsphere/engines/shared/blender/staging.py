@@ -207,7 +207,7 @@ class CyclesStage:
             painted |= self._pictures(instant, sensor, visibility, group, wanted)
         if is_lit:
             if "light" not in painted:
-                background = self.shot.finish(instant).with_background(lacks_background(names)).background
+                background = self.shot.finish(instant, sensor).with_background(lacks_background(names)).background
                 camera, is_open = self.shot.camera(instant, sensor), not shows_sky(background)
                 painted |= self.arrangement(instant).rendered(camera, is_open, wanted=("light",))
             painted |= self._light(instant, sensor, visibility, painted["light"])
@@ -220,7 +220,7 @@ class CyclesStage:
     ) -> dict[str, NDArray[Any]]:
         """Pictures of one light, `rgba` or any of the others, and the other wanted results of its render (see `COMPONENTS`)."""
         camera, arranged = self.shot.camera(instant, sensor), self.arrangement(instant)
-        finish = self.shot.finish(instant).with_background("rgba" in names)
+        finish = self.shot.finish(instant, sensor).with_background("rgba" in names)
         background = display_background(finish.background, camera.width, camera.height)
         is_open = not shows_sky(finish.background)
         fog = self.shot.scene.fog or self.shot.scene.fog_outdoors
