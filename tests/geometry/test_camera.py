@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from pydantic import ValidationError
 
 from lens_limits import lens_limit
 from viewsphere.geometry.camera import (
@@ -125,6 +126,21 @@ def test_folded_rays_are_refused():
     assert np.isnan(pixels[1:]).all()
     assert is_shown.tolist() == [True, False, False]
     assert lens_limit(brown(0.1, 0.02, 0.0, 0.0)) == math.inf
+
+
+@pytest.mark.parametrize("lens", [brown, fisheye])
+def test_a_lens_that_folds_next_to_the_axis_is_an_error(lens):
+    """With k1 alone, the limit is sqrt(-1 / (3 k1)): 0.0204 for k1 = -800, 0.0196 for k1 = -870."""
+    assert lens_limit(lens(-800.0, 0.0, 0.0, 0.0)) == pytest.approx(math.sqrt(1 / 2400))
+    for k1, angle in ((-870.0, "1.1"), (-1e5, "0.1")):
+        told = f"expected coefficients that show 1.1 degrees around the axis; these fold the picture back at {angle} degrees"
+        with pytest.raises(ValidationError, match=told):
+            lens(k1, 0.0, 0.0, 0.0)
+
+
+def test_tangential_terms_that_fold_next_to_the_axis_are_an_error():
+    with pytest.raises(ValidationError, match="these fold the picture back at"):
+        brown(0.0, 0.0, 100.0, 0.0)
 
 
 @PROFILE

@@ -150,6 +150,11 @@ MISTAKES = [
     ({"camera": {"size": [640]}}, "camera.size[1]: expected a value; found nothing", ""),
     ({"camera": {"fov_deg": 40, "focal_px": 3}}, "camera: expected one of fov_deg,", "; found fov_deg and focal_px"),
     ({"camera": {"distortion": {"model": "fisheye", "coefficients": [1]}}}, "camera.distortion: fisheye: expected 4 coeff", ""),
+    (
+        {"camera": {"distortion": {"model": "brown_conrady", "coefficients": [-1e5, 0, 0, 0]}}},
+        "camera.distortion: expected coefficients that show 1.1 degrees around the axis",
+        "",
+    ),
     ({"camera": {"focal_mm": 35}}, "camera: expected focal_mm and sensor_mm together", ""),
     ({"camera": {"focal_mm": 35, "sensor_mm": -1}}, "camera.sensor_mm: expected millimetres above 0", ""),
     ({"camera": {"fov_deg": 180}}, "camera.fov_deg: expected a number less than 180", ""),

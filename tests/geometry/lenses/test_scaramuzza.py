@@ -8,7 +8,7 @@ from lens_proofs import SIZE, LensProofs, directions_of, intrinsics
 from small import small_recipe
 from viewsphere import plan
 from viewsphere.errors import RecipeError
-from viewsphere.geometry.lenses import lens_parameters
+from viewsphere.geometry.lenses import lens_parameters, scaramuzza
 
 OCAM = (-0.42, 0.05, -0.11)
 """About the size of a fisheye of 190 degrees."""
@@ -62,6 +62,19 @@ class TestScaramuzza(LensProofs):
 
                 exact = mpmath.findroot(error, rho)
                 assert abs(float(exact - rho)) * lens.fx < 1e-9
+
+
+@pytest.mark.parametrize("c", [OCAM, (-0.3,), (0.2, -0.3, 0.1, -0.2), (0.5,)])
+def test_the_inverse_ends_after_a_few_steps(c, monkeypatch):
+    """Also for points beyond the limit, on the axis and without a direction: they take no step at all."""
+    sizes, height = [], scaramuzza._height
+    own = lens_parameters("scaramuzza", coefficients=c)
+    points = np.concatenate([np.random.default_rng(7).normal(size=(5000, 3)), np.eye(3)[2:], -np.eye(3)[2:], np.zeros((1, 3))])
+    scaramuzza._table(own.coefficients)
+    monkeypatch.setattr(scaramuzza, "_height", lambda c, rho: sizes.append(len(rho)) or height(c, rho))
+    is_shown = ~np.isnan(scaramuzza._to_plane(own, points)[:, 0])
+    assert len(sizes) < scaramuzza.STEPS / 4 and sizes[0] == is_shown.sum()
+    assert sum(sizes) < 6 * is_shown.sum()
 
 
 @pytest.mark.parametrize(

@@ -12,6 +12,7 @@ from pydantic import Field, model_validator
 
 from viewsphere.geometry.lenses import NEAR, Bounds, ColmapLens, Lens, LensParameters, LensSpec, OpenCVLens, Rays, central
 from viewsphere.geometry.lenses.shared.bent import BentLens, bent_bounds, first_positive_root, padded
+from viewsphere.geometry.lenses.shared.warp import check_limit
 
 Float = NDArray[np.float64]
 
@@ -26,6 +27,7 @@ class BrownConrady(LensParameters, frozen=True):
     def _counted(self) -> Self:
         if len(self.coefficients) not in (4, 5, 8):
             raise ValueError(f"brown_conrady: expected 4 or 5 or 8 coefficients, got {len(self.coefficients)}")
+        check_limit(limit(self.coefficients))
         return self
 
 

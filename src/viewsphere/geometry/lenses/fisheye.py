@@ -12,6 +12,7 @@ from pydantic import Field, model_validator
 
 from viewsphere.geometry.lenses import Bounds, ColmapLens, Lens, LensParameters, LensSpec, OpenCVLens, Rays, central
 from viewsphere.geometry.lenses.shared.bent import BentLens, bent_bounds, first_positive_root
+from viewsphere.geometry.lenses.shared.warp import check_limit
 
 Float = NDArray[np.float64]
 
@@ -26,6 +27,7 @@ class Fisheye(LensParameters, frozen=True):
     def _counted(self) -> Self:
         if len(self.coefficients) != 4:
             raise ValueError(f"fisheye: expected 4 coefficients, got {len(self.coefficients)}")
+        check_limit(limit(self.coefficients))
         return self
 
 

@@ -12,6 +12,7 @@ from pydantic import Field, model_validator
 from viewsphere.geometry.lenses import ColmapLens, LensParameters, LensSpec
 from viewsphere.geometry.lenses.shared.bent import first_positive_root
 from viewsphere.geometry.lenses.shared.image_plane import on_sphere, through_plane, unit
+from viewsphere.geometry.lenses.shared.warp import ROUNDED, check_limit
 
 Float = NDArray[np.float64]
 Term = Annotated[float, Field(ge=-1e4, le=1e4)]
@@ -40,9 +41,7 @@ class Scaramuzza(LensParameters, frozen=True):
 
     @model_validator(mode="after")
     def _unfolded(self) -> Self:
-        if not (limit := _table(self.coefficients).radii[-1]) > 0.02:
-            told = f"these fold the picture back at {limit:.2g} focal lengths"
-            raise ValueError(f"expected coefficients that show 1.1 degrees around the axis; {told}")
+        check_limit(float(_table(self.coefficients).radii[-1]))
         return self
 
 
@@ -77,28 +76,38 @@ def _pseudo_angle(r: Float, z: Float) -> Float:
 
 
 def _to_plane(own: Scaramuzza, points: Float) -> Float:
-    """Positions of points up to the limit, by Newton's method between the two radii of the table around each."""
+    """Positions of points up to the limit."""
     x, y, z = on_sphere(points)
     r = np.sqrt(x * x + y * y)
     table, angle = _table(own.coefficients), _pseudo_angle(r, z)
+    is_shown, rho = (angle <= table.angles[-1]) & ((r > 0) | (z > 0)), np.full(len(r), np.nan)
+    rho[is_shown] = _radii(own.coefficients, r[is_shown], z[is_shown], angle[is_shown])
+    scale = rho / np.where(r > 0, r, 1.0)
+    u = x * scale
+    return np.stack([u, y * scale + own.shear * u], axis=1)
+
+
+def _radii(c: tuple[float, ...], r: Float, z: Float, angle: Float) -> Float:
+    """The radii of rays within the limit, by Newton's method between the two radii of the table around each."""
+    table = _table(c)
     knot = np.clip(np.searchsorted(table.angles, angle) - 1, 0, KNOTS - 2)
+    radii, index = np.empty(len(r)), np.arange(len(r))
     low, high = table.radii[knot], table.radii[knot + 1]
     rho = (low + high) / 2
     for _ in range(STEPS):
-        height, slope = _height(own.coefficients, rho)
+        height, slope = _height(c, rho)
         error = rho * z - r * height  # below 0 inside the ray's radius
         low, high = np.where(error < 0, rho, low), np.where(error < 0, high, rho)
         steep = z - r * slope
         step = rho - error / np.where(steep == 0, 1.0, steep)
         following = np.where((step >= low) & (step <= high) & (steep != 0), step, (low + high) / 2)
-        is_same = np.abs(following - rho) <= 2e-16 * rho
-        rho = following
-        if (is_same | np.isnan(rho) | np.isnan(angle)).all():
+        radii[index] = following
+        # A step back to an end is rounding, and would go to and fro for ever.
+        going = (np.abs(following - rho) > ROUNDED * rho) & (following > low) & (following < high)
+        index, rho, low, high, r, z = (values[going] for values in (index, following, low, high, r, z))
+        if not len(index):
             break
-    is_shown = (angle <= table.angles[-1]) & ((r > 0) | (z > 0))
-    scale = np.where(is_shown, rho / np.where(r > 0, r, 1.0), np.nan)
-    u = x * scale
-    return np.stack([u, y * scale + own.shear * u], axis=1)
+    return radii
 
 
 def _from_plane(own: Scaramuzza, at: Float) -> Float:

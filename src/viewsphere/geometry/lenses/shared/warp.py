@@ -81,7 +81,12 @@ Map = Callable[[tuple[float, ...], Float, Float], Bent]
 
 def check_unfolded(bend: Map, k: tuple[float, ...], farthest: float = FARTHEST) -> None:
     """Raise ValueError for coefficients with which a map is one-to-one nowhere but close to the axis."""
-    if not (limit := warp_of(bend, k, farthest).limit) > NEAREST:
+    check_limit(warp_of(bend, k, farthest).limit)
+
+
+def check_limit(limit: float) -> None:
+    """Raise ValueError for a lens that is one-to-one within `limit`, radians or focal lengths, if that is no usable picture."""
+    if not limit > NEAREST:
         raise ValueError(
             f"expected coefficients that show {math.degrees(NEAREST):.1f} degrees around the axis; these fold the picture back "
             f"at {math.degrees(limit):.2g} degrees"
