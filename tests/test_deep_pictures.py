@@ -359,3 +359,17 @@ def test_blender_s_engines_paint_them_too(engine):
     assert np.abs(bytes_of_words(sample.rgb16).astype(int) - sample.rgb).max() <= 1
     assert np.abs(picture_of_light(sample.rgb_linear, sample.finish.view).astype(int) - sample.rgb).max() <= 1
     assert len(np.unique(sample.rgb16)) > 256
+
+
+@pytest.mark.parametrize(("kind", "deep", "suffix"), [("exr", "rgb_linear", ".exr"), ("png16", "rgb16", ".png")])
+def test_a_deep_picture_that_channels_name_stays_beside_a_transparent_background(tmp_path, kind, deep, suffix):
+    """As the refusal without it advises."""
+    given = {"scene": {"background": "transparent"}, "files": {"rgb": kind}, "viewpoints": {"distance": 1.0}, "formats": []}
+    with pytest.raises(UserError, match=f"name {deep} in channels"):
+        plan(small_recipe(channels=["rgb"], **given))
+    generate(small_recipe(channels=["rgb", deep], **given), tmp_path / "out", workers=0)
+    dataset = Dataset(tmp_path / "out")
+    sample = dataset[0]
+    assert set(sample.files) == {"rgba", deep} and sample.files[deep].endswith(suffix)
+    assert sample.channels["rgba"].shape[2] == 4 and sample.channels[deep].shape[2] == 3
+    assert check(dataset, rays=False, repaint=None).ok

@@ -767,6 +767,64 @@ def test_a_shot_with_an_effect_that_is_not_installed_any_more_is_refused(tmp_pat
         steps_of(shot.finish(0).effects)
 
 
+GLOW = """
+import numpy as np
+from typing import Literal
+from pydantic import Field
+from viewsphere.model.fields.frozen import Frozen
+from viewsphere.model.fields.numbers import Count, Portion
+from viewsphere.plugins.effect import EffectSpec
+
+class Glow(Frozen):
+    glow: Portion = Field(default=0.0, description="light of a window")
+    glow_at: tuple[Portion, Portion] = Field(default=(0.5, 0.5), description="its place")
+    glow_light: tuple[float, ...] = Field(default=(0.5,), description="its light, one or three channels")
+    glow_rows: Count = Field(default=3, description="its rows")
+    glow_side: Literal["left", "right"] = Field(default="left", description="its side")
+    glow_inside: bool = Field(default=True, description="whether it is inside")
+
+def apply(picture, options, context):
+    assert type(options) is Glow and type(options.glow_at) is tuple, options
+    out, row = picture.copy(), int(options.glow_at[1] * 40)
+    out[row:row + options.glow_rows, :20, :3] = np.float32(options.glow_light)
+    return out
+
+EFFECT = EffectSpec(name="glow", options=Glow, strongest="all light", stage="lens", order=1, apply=apply)
+"""
+
+
+@pytest.mark.parametrize(
+    ("given", "allowed"),
+    [
+        ({"glow_at": [0.1, 0.9]}, lambda values: values == [0.1, 0.9]),
+        ({"glow_at": [[0.1, 0.2], 0.9]}, lambda values: 0.1 <= values[0] <= 0.2 and values[1] == 0.9),
+        ({"glow_at": {"uniform": [[0, 0.5], [0.5, 1]]}}, lambda values: values[0] <= 0.5 <= values[1]),
+        ({"glow_light": [0.1, 0.2, 0.3]}, lambda values: values == [0.1, 0.2, 0.3]),
+        ({"glow_light": {"choice": [[0.1], [0.4, 0.5, 0.6]]}}, lambda values: values in ([0.1], [0.4, 0.5, 0.6])),
+        ({"glow_rows": {"uniform": [2, 5]}}, lambda value: type(value) is int and 2 <= value <= 5),
+        ({"glow_side": {"choice": ["left", "right"]}}, lambda value: value in ("left", "right")),
+        ({"glow_inside": {"choice": [True, False]}}, lambda value: type(value) is bool),
+    ],
+)
+def test_an_effect_s_options_of_all_types_are_given_and_drawn(install, tmp_path, given, allowed):
+    install("effects", "glow", GLOW)
+    recipe = small_recipe(scene={"effects": {"glow": 0.5, **given}}, channels=["rgb"], formats=[], viewpoints={"distance": 1})
+    assert Recipe.model_validate(yaml.safe_load(recipe.to_yaml())).scene == recipe.scene
+    generate(recipe, tmp_path / "out", workers=0)
+    dataset = Dataset(tmp_path / "out")
+    for sample, rendered in zip(dataset, render(recipe), strict=True):
+        assert np.array_equal(sample.rgb, rendered.rgb)
+        values = rendered.origin.shot.finish(rendered.origin.instant).effects.values
+        assert all(allowed(values[name]) for name in given)
+    assert check(dataset, rays=False).ok
+
+
+def test_a_whole_number_of_an_effect_has_no_short_form(install):
+    install("effects", "glow", GLOW)
+    with pytest.raises(RecipeError, match=r"scene\.effects\.glow_rows: expected a whole number; found \[1, 5\]"):
+        affected({"glow": 0.5, "glow_rows": [1, 5]})
+
+
 TWO = """
 import numpy as np
 from pydantic import Field
@@ -842,6 +900,11 @@ def test_effects_with_fields_of_one_name_are_refused_together(install):
         ("    is_noisy=True,\n", "", "effect hot_pixels: its `apply` reads `context.seed`, which is for noisy effects"),
         ("return out", "return out[1:]", r"effect hot_pixels: expected its `apply` to return float32 of shape \(.*, 3\)"),
         ("return out", "return None", r"EffectSpec\.apply: expected a function that returns a ndarray; found NoneType"),
+        (
+            "return out",
+            "return np.where(is_hot[..., None], np.float32(np.nan), out)",
+            r"effect hot_pixels: expected its `apply` to return finite numbers; found NaN or infinity in \d+ of \d+ values",
+        ),
     ],
 )
 def test_an_effect_that_returns_no_picture_is_refused(install, old, new, message):

@@ -126,7 +126,7 @@ def _form(kind: Any, *limits: Any) -> Any:
         (inner,) = (arg for arg in args if arg is not NoneType)
         return _form(inner, *limits) | None
     if origin is tuple:
-        kind = tuple[tuple(map(_form, args))]
+        kind = tuple[tuple(arg if arg is Ellipsis else _form(arg) for arg in args)]
     return cast(Any, Drawn)[_read(kind, *limits)]
 
 

@@ -114,10 +114,11 @@ def _check_names(recipe: Recipe) -> None:
             raise RecipeError(f"channels[{i}]: {_unknown(name, tuple(channels()))}")
         check_needs(recipe, f"channels[{i}]", name)
         _check_painted(recipe, f"channels[{i}]", name)
-    if recipe.files.deep and "rgba" in recipe.channels and "rgb" not in recipe.channels:
+    deep = recipe.files.deep
+    if deep and "rgba" in recipe.channels and not {"rgb", deep} & set(recipe.channels):
         raise RecipeError(
             "files.rgb: expected png, jpeg, webp, qoi or jxl with scene.background: transparent, whose pictures have eight "
-            f"bits; found {recipe.files.rgb}: name {recipe.files.deep} in channels, which has the sky, or set a background"
+            f"bits; found {recipe.files.rgb}: name {deep} in channels, which has the sky, or set a background"
         )
     for i, name in enumerate(recipe.annotations):
         _check_annotation(recipe, f"annotations[{i}]", name)

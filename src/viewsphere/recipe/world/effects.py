@@ -53,7 +53,7 @@ class EffectsEntry(PerFrame):
     def effects(self) -> Effects:
         """The effects of an entry without distributions, without noise, in the order in which they are stored."""
         recorded = [field for spec in self.specs if spec.record is not None for field in spec.options.model_fields]
-        fields = {name: value for name, value in self if name not in PerFrame.model_fields}
+        fields = self.model_dump(mode="json", exclude=set(PerFrame.model_fields))
         first = {name: fields.pop(name) for name in dict.fromkeys(recorded)}
         return Effects.model_validate(first | {SEED: 0} | fields)
 

@@ -44,7 +44,7 @@ class EffectContext:
 
     @property
     def seen(self) -> Seen:
-        """The depth and the targets of each pixel, the lens, and the distance of the camera's target."""
+        """The inverse depth and the targets of each pixel, the lens, and the distance of the camera's target."""
         return self._seen()
 
     @property
@@ -96,12 +96,18 @@ def _check_options(names: Iterable[str]) -> None:
 
 
 def _apply(spec: EffectSpec, options: Frozen, seed: int | None, picture: Picture, seen: Callable[[], Seen]) -> Picture:
-    """The picture with an effect; raises PluginError if that is not a picture of the same kind."""
+    """The picture with an effect; raises PluginError if that is not a finite picture of the same kind."""
     changed = spec.apply(picture, options, EffectContext(spec.name, seen, seed))
     changed = plugins.checked(EffectSpec, spec.name, "apply", changed, np.ndarray)
     if changed.shape != picture.shape or changed.dtype != picture.dtype:
         raise PluginError(
             f"effect {spec.name}: expected its `apply` to return {_kind(picture)}, as it was given; found {_kind(changed)}"
+        )
+    if plugins.is_third_party(EffectSpec.KIND, spec.name) and not np.isfinite(changed).all():
+        wrong = int(np.count_nonzero(~np.isfinite(changed)))
+        raise PluginError(
+            f"effect {spec.name}: expected its `apply` to return finite numbers; found NaN or infinity in {wrong} of "
+            f"{changed.size} values: guard its divisions and roots"
         )
     return changed
 
