@@ -9,6 +9,7 @@ import pytest
 from viewsphere import plugins
 from viewsphere.composing.seeds import generator, share
 from viewsphere.model.fields.frozen import Frozen
+from viewsphere.plugins.effect import EffectSpec
 from viewsphere.plugins.light import LightSpec
 from viewsphere.plugins.motion import MotionSpec
 from viewsphere.plugins.placer import PlacerSpec
@@ -100,6 +101,14 @@ def test_no_draw_has_another_seed_or_value_than_the_pinned():
     assert {path: now.get(path) for path in pinned} == pinned
     added = {path for path in set(now) - set(pinned) if known.isdisjoint(path.split("."))}
     assert not added, "add new draws to seed_names.json"
+
+
+def test_the_draws_of_every_recorded_effect_are_pinned():
+    """A field with another name would draw other values, which changes the pictures of recipes that have it."""
+    pinned = {path.partition(".")[2] for path in json.loads(PINNED.read_text()) if path.startswith("effects.")}
+    specs = (plugins.load(EffectSpec, name) for name in plugins.shipped("effects"))
+    assert pinned == {name for spec in specs if spec.record is not None for name in spec.options.model_fields}
+    assert {f"effects.{name}" for name in pinned} <= seed_paths()
 
 
 def test_a_renamed_field_keeps_its_draw(monkeypatch):

@@ -58,6 +58,14 @@ class EffectSpec(Spec):
     shows_motion: bool = Field(
         default=False, description="whether it blurs as motion does; recipes with an open shutter refuse it, as they blur, too"
     )
+    shows_seam: bool = Field(
+        default=False,
+        description="whether it spreads light between pixels, or grows from the picture's middle to its corners: pictures of a "
+        "full turn refuse it, as it would show the seam at their sides",
+    )
+    needs_pinhole: bool = Field(
+        default=False, description="whether it follows from a pinhole's distances; pictures with parallel rays refuse it"
+    )
     record: int | None = Field(
         default=None,
         description="for the oldest effects: the place in digests and stored shots, which have them at strength 0, too. Leave "

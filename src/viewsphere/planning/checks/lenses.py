@@ -14,9 +14,6 @@ from viewsphere.plugins.engine import EngineSpec
 from viewsphere.recipe.draws import alternatives, span
 from viewsphere.recipe.recipe import Recipe
 
-OF_PINHOLES = ("depth_of_field", "edge_highlight")
-"""Effects that follow from the distances of a pinhole's pictures."""
-
 
 def check_lenses(recipe: Recipe, rig: Rig) -> None:
     """Check that labels, the engine, weather and effects support the lenses of the rig's sensors."""
@@ -63,6 +60,10 @@ def _of_pictures(recipe: Recipe, lens: str) -> Iterator[tuple[str, str]]:
                     f"scene.{name}",
                     f"expected off beside projection: {lens}, whose rays begin far apart; found {name}",
                 )
-        for name in OF_PINHOLES:
-            if any(span(value)[1] > 0 for value in alternatives(getattr(scene.effects, name))):
-                yield f"scene.effects.{name}", f"expected 0 beside projection: {lens}, as it is made for a pinhole; found more"
+        for spec, strength in scene.effects.strengths:
+            if spec.needs_pinhole and any(span(strength)):
+                found = f"{max(span(strength), key=abs):g}"
+                yield (
+                    f"scene.effects.{spec.name}",
+                    f"expected 0 beside projection: {lens}, as it is made for a pinhole; found {found}",
+                )

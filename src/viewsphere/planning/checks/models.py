@@ -288,7 +288,7 @@ def _check_shutter(recipe: Recipe) -> None:
     if recipe.time is None or not recipe.time.shutter:
         return
     for spec, strength in recipe.scene.effects.strengths:
-        if spec.shows_motion and any(span(blur)[1] > 0 for blur in alternatives(strength)):
+        if spec.shows_motion and any(span(strength)):
             raise RecipeError(
                 f"time.shutter: expected 0 beside scene.effects.{spec.name}, which blurs pictures, too; found "
                 f"{recipe.time.shutter:g}: leave one of them out"

@@ -11,11 +11,6 @@ from viewsphere.recipe.draws import alternatives, span
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.recipe.world.scene import SceneEntry
 
-FLAT_EFFECTS = (
-    "edge_highlight", "depth_of_field", "motion_blur", "blur", "chromatic_aberration", "vignetting",
-)  # fmt: skip
-"""Effects that spread light across the picture's border, or that grow from its middle to its corners."""
-
 
 def check_panoramas(recipe: Recipe, rig: Rig) -> None:
     """Refuse labels that panoramas lack, and parts of a scene that would show their seam. Raises RecipeError."""
@@ -53,10 +48,9 @@ def _check_seam(where: str, scene: SceneEntry, sensor: Sensor) -> None:
 
 def _flat(scene: SceneEntry) -> Iterator[tuple[str, str]]:
     """The parts of a scene that end at the sides of the picture, with their values."""
-    for name in FLAT_EFFECTS:
-        for value in alternatives(getattr(scene.effects, name)):
-            if span(value)[1] > 0:
-                yield f"effects.{name}", f"{span(value)[1]:g}"
+    for spec, strength in scene.effects.strengths:
+        if spec.shows_seam and any(span(strength)):
+            yield f"effects.{spec.name}", f"{max(span(strength), key=abs):g}"
     for name in ("rain", "snow"):
         if any(value != "off" for value in alternatives(getattr(scene, name))):
             yield name, "it"

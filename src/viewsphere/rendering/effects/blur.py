@@ -28,5 +28,12 @@ def _apply(picture: NDArray[np.float32], options: _Blur, _context: EffectContext
 
 
 EFFECT = EffectSpec(
-    name="blur", options=_Blur, strongest="a Gaussian of sigma W / 50", stage="lens", order=30, apply=_apply, record=1
+    name="blur",
+    options=_Blur,
+    strongest="a Gaussian of sigma W / 50",
+    stage="lens",
+    order=30,
+    apply=_apply,
+    shows_seam=True,
+    record=1,
 )

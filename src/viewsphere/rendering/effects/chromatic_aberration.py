@@ -58,5 +58,6 @@ EFFECT = EffectSpec(
     stage="lens",
     order=40,
     apply=_apply,
+    shows_seam=True,
     record=5,
 )

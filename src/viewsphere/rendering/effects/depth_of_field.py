@@ -135,5 +135,7 @@ EFFECT = EffectSpec(
     stage="lens",
     order=10,
     apply=_apply,
+    shows_seam=True,
+    needs_pinhole=True,
     record=3,
 )

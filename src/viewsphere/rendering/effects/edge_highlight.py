@@ -80,5 +80,7 @@ EFFECT = EffectSpec(
     stage="objects",
     order=10,
     apply=_apply,
+    shows_seam=True,
+    needs_pinhole=True,
     record=10,
 )

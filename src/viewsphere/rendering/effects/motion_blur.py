@@ -56,5 +56,6 @@ EFFECT = EffectSpec(
     order=20,
     apply=_apply,
     shows_motion=True,
+    shows_seam=True,
     record=2,
 )

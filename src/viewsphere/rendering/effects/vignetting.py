@@ -44,5 +44,6 @@ EFFECT = EffectSpec(
     stage="lens",
     order=50,
     apply=_apply,
+    shows_seam=True,
     record=4,
 )
