@@ -211,7 +211,7 @@ BROKEN = [
     (opencv(K1=K1, K2=K2, R=R), "T: expected a matrix; found nothing"),
     (opencv(K1=K1, D1=[0.0] * 12 + [1.5, 0], K2=K2, R=R, T=T[:, None]), "D1: thin_prism: expected tilts within 1.2 radians"),
     (camera_info("a", K1, D1, np.eye(3), np.zeros((3, 4))), "projection_matrix: expected focal lengths above 0"),
-    (camera_info("a", K1, D1, np.eye(3), np.eye(4)[:3], model="omni"), "distortion_model: expected plumb_bob"),
+    (camera_info("a", K1, D1, np.eye(3), np.eye(4)[:3], model="omni"), "distortion_model: expected one of plumb_bob"),
     ("%YAML:1.0\n---\nR: !!opencv-matrix\n   rows: 2\n   cols: 3\n   data: [1]\nK1: 1\n", "rows x cols numbers"),
     ("a: !!python/object/apply:os.system ['true']", "expected YAML"),
 ]  # fmt: skip

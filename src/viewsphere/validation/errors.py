@@ -115,8 +115,38 @@ def shown(value: object) -> str:
         return {None: "null", True: "true", False: "false"}[value]
     if isinstance(value, Mapping):
         return "a mapping"
-    text = repr(list(value)) if isinstance(value, tuple) else repr(value)
-    return text if len(text) <= 60 else f"{text[:57]}..."
+    text = ""
+    for part in _parts(value):
+        text += part
+        if len(text) > 60:
+            return f"{text[:57]}..."
+    return text
+
+
+def _parts(value: object) -> Iterator[str]:
+    """Yield a value's text from its beginning on, so that a reader of the first parts alone never builds the whole: by aliases,
+    a few lines of YAML can stand for billions of values.
+    """
+    if isinstance(value, (str, bytes)):
+        yield repr(value[:61])
+    elif isinstance(value, int) and value.bit_length() > 1000:  # Python refuses to write out thousands of digits
+        yield f"a whole number of {value.bit_length()} bits"
+    elif isinstance(value, (list, tuple)):
+        yield "["
+        for i, item in enumerate(cast("Sequence[object]", value)):
+            yield ", " if i else ""
+            yield from _parts(item)
+        yield "]"
+    elif isinstance(value, dict):
+        yield "{"
+        for i, (key, item) in enumerate(cast("dict[object, object]", value).items()):
+            yield ", " if i else ""
+            yield from _parts(key)
+            yield ": "
+            yield from _parts(item)
+        yield "}"
+    else:
+        yield repr(value)
 
 
 def explained(error: ValidationError, fields: Sequence[str], steps: Path = ()) -> ValidationError:

@@ -14,9 +14,9 @@ from viewsphere.composing.viewpoints.pose_files.motions import from_quaternion
 from viewsphere.errors import RecipeError
 from viewsphere.geometry.lenses import lens_parameters
 from viewsphere.geometry.rotation import rigid
-from viewsphere.planning.rig_files.documents import row, size
-from viewsphere.planning.rig_files.entries import Calibrated, camera_matrix, mapping, relative
-from viewsphere.validation.errors import told_of
+from viewsphere.planning.rig_files.documents import mapping, one_of, row, size
+from viewsphere.planning.rig_files.entries import Calibrated, camera_matrix, relative
+from viewsphere.validation.errors import shown, told_of
 
 MODELS = {"FisheyeRadTanThinPrism": ("fisheye624", 15), "KannalaBrandtK3": ("fisheye", 8)}
 """Lens and number of parameters of each model: with one focal length (f, cx, cy), and with two (fx, fy, cx, cy)."""
@@ -35,7 +35,7 @@ def sensors(documents: Mapping[Path, dict[str, Any]], rectified: bool) -> tuple[
     (document,) = documents.values()
     cameras = document.get("CameraCalibrations")
     if not isinstance(cameras, list) or not cameras:
-        raise RecipeError(f"{where}: CameraCalibrations: expected a list of cameras; found {cameras!r:.40}")
+        raise RecipeError(f"{where}: CameraCalibrations: expected a list of cameras; found {shown(cameras)}")
     entries = enumerate(cast("list[Any]", cameras))
     return relative([_camera(mapping(e, f"{where}: CameraCalibrations[{i}]"), f"{where}: camera {i}") for i, e in entries])
 
@@ -43,12 +43,10 @@ def sensors(documents: Mapping[Path, dict[str, Any]], rectified: bool) -> tuple[
 def _camera(entry: Mapping[str, Any], where: str) -> Calibrated:
     name = entry.get("Label")
     if not isinstance(name, str) or not name:
-        raise RecipeError(f"{where}: Label: expected a name; found {name!r:.40}")
+        raise RecipeError(f"{where}: Label: expected a name; found {shown(name)}")
     projection = mapping(entry.get("Projection"), f"{where}: Projection")
-    kind, values = projection.get("Name"), row(projection.get("Params"), f"{where}: Projection.Params")
-    if kind not in MODELS:
-        raise RecipeError(f"{where}: Projection.Name: expected one of {', '.join(MODELS)}; found {kind!r:.40}")
-    model, count = MODELS[kind]
+    model, count = MODELS[one_of(projection.get("Name"), MODELS, f"{where}: Projection.Name")]
+    values = row(projection.get("Params"), f"{where}: Projection.Params")
     if len(values) != count:
         raise RecipeError(f"{where}: Projection.Params: expected {count} numbers; found {len(values)}")
     matrix, rest = (values[:1] + values[:3], values[3:]) if model == "fisheye624" else (values[:4], values[4:])
@@ -69,5 +67,5 @@ def _pose(entry: Mapping[str, Any], where: str) -> Any:
     shift, turn = row(entry.get("Translation"), f"{where}.Translation"), entry.get("UnitQuaternion")
     parts = cast("list[Any]", turn) if isinstance(turn, list) else []
     if len(shift) != 3 or len(parts) != 2 or not isinstance(parts[1], list) or len(cast("list[Any]", parts[1])) != 3:
-        raise RecipeError(f"{where}: expected Translation [x, y, z] and UnitQuaternion [w, [x, y, z]]; found {turn!r:.60}")
+        raise RecipeError(f"{where}: expected Translation [x, y, z] and UnitQuaternion [w, [x, y, z]]; found {shown(turn)}")
     return rigid(from_quaternion(row([parts[0], *parts[1]], f"{where}.UnitQuaternion"), where), shift)

@@ -15,9 +15,9 @@ from viewsphere.composing.viewpoints.pose_files.motions import from_quaternion
 from viewsphere.errors import RecipeError
 from viewsphere.geometry.lenses import LensParameters, lens_parameters
 from viewsphere.geometry.rotation import rigid
-from viewsphere.planning.rig_files.documents import row, size
-from viewsphere.planning.rig_files.entries import Calibrated, brown_conrady, camera_matrix, fisheye, mapping, relative
-from viewsphere.validation.errors import told_of
+from viewsphere.planning.rig_files.documents import mapping, one_of, row, size
+from viewsphere.planning.rig_files.entries import Calibrated, brown_conrady, camera_matrix, fisheye, relative
+from viewsphere.validation.errors import shown, told_of
 
 MATRIX = ("fx", "fy", "cx", "cy")
 
@@ -70,16 +70,15 @@ def sensors(documents: Mapping[Path, dict[str, Any]], rectified: bool) -> tuple[
 
 def _listed(value: Any, where: str) -> list[Any]:
     if not isinstance(value, list):
-        raise RecipeError(f"{where}: expected a list; found {'nothing' if value is None else repr(value)[:40]}")
+        raise RecipeError(f"{where}: expected a list; found {'nothing' if value is None else shown(value)}")
     return cast("list[Any]", value)
 
 
 def _camera(i: int, lens: Any, pose: Any, extent: Any, where: str) -> Calibrated:
     at = f"{where}: intrinsics[{i}]"
     entry = mapping(lens, at)
-    kind, given = entry.get("camera_type"), mapping(entry.get("intrinsics"), f"{at}.intrinsics")
-    if kind not in MODELS:
-        raise RecipeError(f"{at}.camera_type: expected one of {', '.join(MODELS)}; found {kind!r:.40}")
+    given = mapping(entry.get("intrinsics"), f"{at}.intrinsics")
+    kind = one_of(entry.get("camera_type"), MODELS, f"{at}.camera_type")
     names = (*MATRIX, *MODELS[kind].names.split())
     values = {name: number(given.get(name), f"{at}.intrinsics.{name}") for name in names}
     with told_of(f"{at}.intrinsics"):

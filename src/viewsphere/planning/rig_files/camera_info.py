@@ -15,8 +15,9 @@ import numpy as np
 from viewsphere.errors import RecipeError
 from viewsphere.geometry.lenses import LensParameters
 from viewsphere.geometry.rotation import rigid
-from viewsphere.planning.rig_files.documents import matrix, size
+from viewsphere.planning.rig_files.documents import matrix, one_of, size
 from viewsphere.planning.rig_files.entries import Calibrated, brown_conrady, fisheye, pinhole, relative, rotation
+from viewsphere.validation.errors import shown
 
 MODELS = ("plumb_bob", "rational_polynomial", "equidistant", "fisheye", "")
 
@@ -47,7 +48,7 @@ def _camera(path: Path, found: Mapping[str, Any], rectified: bool) -> Calibrated
     lens = pinhole(p if rectified else k, f"{path}: {'projection' if rectified else 'camera'}_matrix")
     axes = np.eye(3) if rectified else rotation(turn, f"{path}: rectification_matrix")
     return Calibrated(
-        name=str(found.get("camera_name") or path.stem),
+        name=_name(found.get("camera_name"), path),
         lens=lens,
         distortion=None if rectified else _distortion(found, path),
         rig_from_sensor=rigid(axes, shift),
@@ -55,9 +56,13 @@ def _camera(path: Path, found: Mapping[str, Any], rectified: bool) -> Calibrated
     )
 
 
+def _name(given: Any, path: Path) -> str:
+    """The name in a file, which YAML may have read as a number, or the file's own."""
+    return given if isinstance(given, str) and given else Calibrated.name_by(path) if given in (None, "") else shown(given)
+
+
 def _distortion(found: Mapping[str, Any], path: Path) -> LensParameters | None:
-    model, where = found.get("distortion_model", ""), f"{path}: distortion_coefficients"
-    if model not in MODELS:
-        raise RecipeError(f"{path}: distortion_model: expected {', '.join(MODELS[:4])}; found {model!r}")
+    model = one_of(found.get("distortion_model", ""), MODELS, f"{path}: distortion_model")
+    where = f"{path}: distortion_coefficients"
     numbers = matrix(found["distortion_coefficients"], where).ravel().tolist() if "distortion_coefficients" in found else []
     return (fisheye if model in ("equidistant", "fisheye") else brown_conrady)(numbers, where)

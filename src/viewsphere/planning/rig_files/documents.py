@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
+from itertools import chain
 from pathlib import Path
 from typing import Any, cast
 
@@ -10,18 +11,53 @@ import numpy as np
 import yaml
 from numpy.typing import NDArray
 
-from viewsphere.composing.viewpoints.pose_files.lines import number, read_text
+from viewsphere.composing.viewpoints.pose_files.lines import number, picture_size, read_text
 from viewsphere.errors import RecipeError
+from viewsphere.limits import limits
 from viewsphere.planning.rig_files.encoded import colmap_lines, xml_document
 from viewsphere.recipe.reading.file import ShallowLoader
+from viewsphere.validation.errors import shown
 
 Float = NDArray[np.float64]
 
 
 class _Loader(ShallowLoader):
     """A loader of plain data; `!!opencv-matrix` becomes a mapping, and a vector in OpenCV 5's `!!opencv-nd-matrix` becomes one
-    column.
+    column. It ends before values that stand, by aliases, for more than the limit of a recipe.
     """
+
+    def __init__(self, text: str) -> None:
+        super().__init__(text)
+        self._left = self._most = limits.MAX_RECIPE_VALUES
+
+    def compose_node(self, parent: yaml.Node | None, index: Any) -> yaml.Node | None:
+        """The next node; raises ConstructorError for one beyond the limit, before the rest is read."""
+        self._left -= 1
+        if self._left < 0:
+            raise self._too_many(self.peek_event().start_mark)
+        return super().compose_node(parent, index)
+
+    def get_single_node(self) -> yaml.Node | None:
+        """The document's node; raises ConstructorError for too many values, and for a value within itself."""
+        root = super().get_single_node()
+        if root is not None:
+            self._count(root, {})
+        return root
+
+    def _count(self, node: yaml.Node, counted: dict[int, int]) -> int:
+        """The number of values that a node stands for; `counted` has those of nodes before it, 0 for those around it."""
+        if id(node) not in counted:
+            counted[id(node)] = 0
+            parts = node.value if isinstance(node, yaml.CollectionNode) else ()
+            nodes = chain.from_iterable(parts) if isinstance(node, yaml.MappingNode) else parts
+            counted[id(node)] = 1 + sum(self._count(part, counted) for part in nodes)
+        if not 0 < counted[id(node)] <= self._most:
+            raise self._too_many(node.start_mark)
+        return counted[id(node)]
+
+    def _too_many(self, mark: yaml.Mark) -> yaml.constructor.ConstructorError:
+        problem = f"at most {self._most:,} values (limit MAX_RECIPE_VALUES) were expected; found more: write fewer aliases"
+        return yaml.constructor.ConstructorError(problem=problem, problem_mark=mark)
 
 
 def _as_mapping(loader: yaml.SafeLoader, node: yaml.MappingNode) -> dict[Any, Any]:
@@ -32,7 +68,7 @@ def _as_columns(loader: yaml.SafeLoader, node: yaml.MappingNode) -> dict[Any, An
     entry = _as_mapping(loader, node)
     sizes = entry.get("sizes")
     if not isinstance(sizes, list) or len(cast("list[Any]", sizes)) not in (1, 2):
-        problem = f"sizes of a vector or a matrix were expected; found {sizes!r:.40}"
+        problem = f"sizes of a vector or a matrix were expected; found {shown(sizes)}"
         raise yaml.constructor.ConstructorError(problem=problem, problem_mark=node.start_mark)
     rows, columns = (*cast("list[Any]", sizes), 1)[:2]
     return entry | {"rows": rows, "cols": columns}
@@ -43,7 +79,7 @@ _Loader.add_constructor("tag:yaml.org,2002:opencv-nd-matrix", _as_columns)
 
 
 def read_document(path: Path) -> dict[str, Any]:
-    """A calibration file's mapping; raises RecipeError for any other file. A .txt or .bin has `lines`, lists of words.
+    """A calibration file's mapping; raises RecipeError for any other file. A .txt or .bin alone has `lines`, lists of words.
 
     OpenCV writes `%YAML:1.0`, which is not a valid YAML directive (https://docs.opencv.org/4.x/da/d56/group__core__xml.html).
     """
@@ -59,13 +95,35 @@ def read_document(path: Path) -> dict[str, Any]:
         text = text.partition("\n")[2]
     try:
         document = yaml.load(text, _Loader)  # safe: the loader makes plain data alone
-    except (yaml.YAMLError, RecursionError, ValueError) as error:
+    except (yaml.YAMLError, RecursionError, ValueError, LookupError, AttributeError, TypeError, OverflowError) as error:
         mark = getattr(error, "problem_mark", None)
         line = f":{mark.line + 1}" if mark else ""
-        raise RecipeError(f"{path}{line}: expected YAML; found a mistake: {getattr(error, 'problem', error)}") from None
+        problem = str(getattr(error, "problem", None) or error).partition("\n")[0]
+        raise RecipeError(f"{path}{line}: expected YAML; found a mistake: {problem:.120}") from None
     if not isinstance(document, dict):
         raise RecipeError(f"{path}: expected a mapping; found {type(document).__name__}")
-    return cast("dict[str, Any]", document)
+    return {name: value for name, value in cast("dict[str, Any]", document).items() if name != "lines"}
+
+
+def _found(value: object) -> str:
+    """A value for messages, in at most about 60 characters; `nothing` for None."""
+    return "nothing" if value is None else shown(value)
+
+
+def one_of(value: Any, known: Collection[str], where: str) -> str:
+    """A name out of `known`; raises RecipeError for anything else, lists and mappings among them."""
+    if not isinstance(value, str) or value not in known:
+        raise RecipeError(
+            f"{where}: expected one of {', '.join(filter(None, known))}; found {_found(value)}: calibrate it as one"
+        )
+    return value
+
+
+def mapping(value: Any, where: str) -> dict[str, Any]:
+    """A mapping of a document; raises RecipeError for any other value."""
+    if not isinstance(value, dict):
+        raise RecipeError(f"{where}: expected a mapping; found {_found(value)}")
+    return cast("dict[str, Any]", value)
 
 
 def matrix(value: Any, where: str, shape: tuple[int, int] | None = None) -> Float:
@@ -74,17 +132,17 @@ def matrix(value: Any, where: str, shape: tuple[int, int] | None = None) -> Floa
         entry = cast("dict[str, Any]", value)
         data = row(entry.get("data"), f"{where}.data")
         rows, columns = entry.get("rows"), entry.get("cols")
-        if not isinstance(rows, int) or not isinstance(columns, int) or rows < 1 or rows * columns != len(data):
-            values = f"{rows!r:.40} x {columns!r:.40} and {len(data)} numbers"
+        if type(rows) is not int or type(columns) is not int or rows < 1 or rows * columns != len(data):
+            values = f"{_found(rows)} x {_found(columns)} and {len(data)} numbers"
             raise RecipeError(f"{where}: expected rows x cols numbers; found {values}")
         values = np.array(data, np.float64).reshape(rows, columns)
     elif isinstance(value, list):
         lines = [row(line, where) for line in cast("list[Any]", value)]
         if len({len(line) for line in lines}) != 1:
-            raise RecipeError(f"{where}: expected rows of equal length; found {[len(line) for line in lines]}")
+            raise RecipeError(f"{where}: expected rows of equal length; found {shown([len(line) for line in lines])}")
         values = np.array(lines, np.float64)
     else:
-        raise RecipeError(f"{where}: expected a matrix; found {'nothing' if value is None else repr(value)[:40]}")
+        raise RecipeError(f"{where}: expected a matrix; found {_found(value)}")
     if shape is not None and values.shape != shape:
         raise RecipeError(f"{where}: expected {shape[0]} x {shape[1]} numbers; found {values.shape[0]} x {values.shape[1]}")
     return values
@@ -93,7 +151,7 @@ def matrix(value: Any, where: str, shape: tuple[int, int] | None = None) -> Floa
 def row(value: Any, where: str) -> list[float]:
     """A list of finite numbers."""
     if not isinstance(value, list):
-        raise RecipeError(f"{where}: expected a list of numbers; found {'nothing' if value is None else repr(value)[:40]}")
+        raise RecipeError(f"{where}: expected a list of numbers; found {_found(value)}")
     return [number(cell, where) for cell in cast("Sequence[object]", value)]
 
 
@@ -101,7 +159,4 @@ def size(width: Any, height: Any, where: str) -> tuple[int, int] | None:
     """The pictures' [width, height], None if the file has none; raises RecipeError for an invalid size."""
     if width is None or height is None:
         return None
-    sides = number(width, where), number(height, where)
-    if min(sides) < 1 or any(side != int(side) for side in sides):
-        raise RecipeError(f"{where}: expected whole numbers of pixels above 0; found {width} and {height}")
-    return int(sides[0]), int(sides[1])
+    return picture_size(width, height, where)

@@ -12,6 +12,7 @@ from viewsphere.assets.paths.folder import ModelFolder
 from viewsphere.assets.readers.shared.xml_tree import parse_xml
 from viewsphere.errors import ModelError, RecipeError
 from viewsphere.geometry.lenses.shared.colmap import NAMES, PARAMETERS
+from viewsphere.validation.errors import shown
 
 
 def colmap_lines(path: Path) -> list[list[str]]:
@@ -40,8 +41,8 @@ def xml_document(path: Path, text: str) -> dict[str, Any]:
     except ModelError as error:
         raise RecipeError(str(error).partition("\n")[0]) from None
     if root.tag != "opencv_storage":
-        raise RecipeError(f"{path}: expected OpenCV's opencv_storage; found {root.tag!r:.40}")
-    return {child.tag: _value(child) for child in root}
+        raise RecipeError(f"{path}: expected OpenCV's opencv_storage; found {shown(root.tag)}")
+    return {child.tag: _value(child) for child in root if child.tag != "lines"}
 
 
 def _value(entry: Element) -> Any:

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import re
+import unicodedata
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any, cast
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +21,9 @@ Float = NDArray[np.float64]
 
 CENTER = 0.5
 """Offset added to principal points that are counted from the centre of the first pixel."""
+
+LONGEST_NAME = 64
+"""Characters of a sensor's name, as in recipes."""
 
 RIGHT_ANGLES = 1e-3
 """Tolerance for rotations in files, which may have few digits; the nearest rotation replaces them."""
@@ -35,6 +40,12 @@ class Calibrated:
     distortion: LensParameters | None
     rig_from_sensor: Float
     size: tuple[int, int] | None = None
+
+    @staticmethod
+    def name_by(path: Path) -> str:
+        """A valid name of a sensor from its file's: letters without accents, and `_` for what names may not have."""
+        plain = unicodedata.normalize("NFKD", path.stem).encode("ascii", "ignore").decode()
+        return re.sub(r"[^A-Za-z0-9.-]+", "_", plain).lstrip("_.-")[:LONGEST_NAME].rstrip("_.-") or "camera"
 
 
 def pinhole(camera: Float, where: str) -> dict[str, float]:
@@ -72,7 +83,7 @@ def fisheye(numbers: Sequence[float], where: str) -> LensParameters:
 def rotation(matrix: Float, where: str) -> Float:
     """The rotation (3, 3) nearest to a file's matrix; raises RecipeError if they differ too much."""
     rotation = nearest_rotation(matrix) if matrix.shape == (3, 3) else None
-    if rotation is None or np.abs(rotation - matrix).max() > RIGHT_ANGLES:
+    if rotation is None or not np.abs(rotation - matrix).max() <= RIGHT_ANGLES:
         raise RecipeError(f"{where}: expected a rotation; found a matrix that is none")
     return rotation
 
@@ -89,10 +100,3 @@ def relative(sensors: Sequence[Calibrated]) -> tuple[Calibrated, ...]:
     back = inverse(first[:3, :3], first[:3, 3])
     others = (replace(sensor, rig_from_sensor=compose(back, sensor.rig_from_sensor)) for sensor in sensors[1:])
     return replace(sensors[0], rig_from_sensor=np.eye(4)), *others
-
-
-def mapping(value: Any, where: str) -> dict[str, Any]:
-    """A mapping of a document; raises RecipeError for any other value."""
-    if not isinstance(value, dict):
-        raise RecipeError(f"{where}: expected a mapping; found {'nothing' if value is None else repr(value)[:40]}")
-    return cast("dict[str, Any]", value)

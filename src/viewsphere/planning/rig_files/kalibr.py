@@ -13,9 +13,9 @@ import numpy as np
 from viewsphere.errors import RecipeError
 from viewsphere.geometry.lenses import LensParameters, lens_parameters
 from viewsphere.geometry.rotation import compose
-from viewsphere.planning.rig_files.documents import matrix, row, size
+from viewsphere.planning.rig_files.documents import matrix, one_of, row, size
 from viewsphere.planning.rig_files.entries import Calibrated, brown_conrady, camera_matrix, fisheye, inverse, rotation
-from viewsphere.validation.errors import told_of
+from viewsphere.validation.errors import shown, told_of
 
 MODELS = {"pinhole": (), "omni": ("xi",), "ds": ("xi", "alpha"), "eucm": ("alpha", "beta")}
 """Camera models, and their intrinsics before fx, fy, cx and cy."""
@@ -41,7 +41,7 @@ def sensors(documents: Mapping[Path, dict[str, Any]], rectified: bool) -> tuple[
     while (name := f"cam{len(calibrated)}") in document:
         entry, at = document[name], f"{where}: {name}"
         if not isinstance(entry, dict):
-            raise RecipeError(f"{at}: expected a mapping; found {entry!r:.40}")
+            raise RecipeError(f"{at}: expected a mapping; found {shown(entry)}")
         camera = cast("dict[str, Any]", entry)
         if calibrated:
             step = matrix(camera.get("T_cn_cnm1"), f"{at}: T_cn_cnm1", (4, 4))
@@ -51,9 +51,7 @@ def sensors(documents: Mapping[Path, dict[str, Any]], rectified: bool) -> tuple[
 
 
 def _camera(name: str, entry: Mapping[str, Any], pose: np.ndarray[Any, np.dtype[np.float64]], at: str) -> Calibrated:
-    model = entry.get("camera_model", "pinhole")
-    if model not in MODELS:
-        raise RecipeError(f"{at}: camera_model: expected one of {', '.join(MODELS)}; found {model!r:.40}")
+    model = one_of(entry.get("camera_model", "pinhole"), MODELS, f"{at}: camera_model")
     names, numbers = (*MODELS[model], "fx", "fy", "cx", "cy"), row(entry.get("intrinsics"), f"{at}: intrinsics")
     if len(numbers) != len(names):
         raise RecipeError(f"{at}: intrinsics: expected {', '.join(names)}; found {len(numbers)} numbers")
@@ -72,7 +70,7 @@ def _lens(model: str, own: dict[str, float], entry: Mapping[str, Any], at: str) 
         return _distortion(entry, at)
     if bent != "none" and (model, bent) != ("omni", "radtan"):
         expected = "none or radtan" if model == "omni" else "none"
-        raise RecipeError(f"{at}: distortion_model: expected {expected} beside {model}; found {bent!r:.40}")
+        raise RecipeError(f"{at}: distortion_model: expected {expected} beside {model}; found {shown(bent)}")
     with told_of(f"{at}: intrinsics"):
         if model != "omni":
             return lens_parameters({"ds": "double_sphere"}.get(model, model), **own)
@@ -97,5 +95,5 @@ def _distortion(entry: Mapping[str, Any], at: str) -> LensParameters | None:
                 return lens_parameters("fov", omega=numbers[0])
         case _:
             raise RecipeError(
-                f"{at}: distortion_model: expected radtan, equidistant, fov or none; found {model!r}: calibrate it as one"
+                f"{at}: distortion_model: expected radtan, equidistant, fov or none; found {shown(model)}: calibrate it as one"
             )

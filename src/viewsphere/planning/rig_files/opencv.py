@@ -19,6 +19,7 @@ from viewsphere.geometry.lenses import LensParameters
 from viewsphere.geometry.rotation import rigid
 from viewsphere.planning.rig_files.documents import matrix, size
 from viewsphere.planning.rig_files.entries import Calibrated, brown_conrady, fisheye, inverse, pinhole, rotation
+from viewsphere.validation.errors import shown
 
 Float = NDArray[np.float64]
 
@@ -36,7 +37,7 @@ def sensors(documents: Mapping[Path, dict[str, Any]], rectified: bool) -> tuple[
     found = dict(chain.from_iterable(document.items() for document in documents.values()))
     extent = _size(found, where)
     if "camera_matrix" in found:
-        return _single(found, rectified, next(iter(documents)).stem, where)
+        return _single(found, rectified, Calibrated.name_by(next(iter(documents))), where)
     if rectified:
         left, right = (matrix(found.get(name), f"{where}: {name}", (3, 4)) for name in ("P1", "P2"))
         lenses = [(pinhole(one, where), None) for one in (left, right)]  # which refuses focal lengths of 0
@@ -46,7 +47,7 @@ def sensors(documents: Mapping[Path, dict[str, Any]], rectified: bool) -> tuple[
         turn = rotation(matrix(found.get("R"), f"{where}: R"), f"{where}: R")
         shift = matrix(found.get("T"), f"{where}: T").ravel()
         if len(shift) != 3 or not shift.any():
-            raise RecipeError(f"{where}: T: expected 3 numbers, not all 0; found {shift.tolist()}")
+            raise RecipeError(f"{where}: T: expected 3 numbers, not all 0; found {shown(shift.tolist())}")
         lenses = ((pinhole(_camera(found, i, where), where), _distortion(found, i, where)) for i in (1, 2))
         poses = np.eye(4), inverse(turn, shift)
     named = zip(("left", "right"), lenses, poses, strict=True)

@@ -2,14 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 import numpy as np
 
 from viewsphere.composing.viewpoints.pose_files.entries import Extrinsics, PoseFile
 from viewsphere.composing.viewpoints.pose_files.lens import one_lens
-from viewsphere.composing.viewpoints.pose_files.lines import counted, number, numbers, read_lines, read_text
+from viewsphere.composing.viewpoints.pose_files.lines import (
+    IDENTIFIER,
+    counted,
+    number,
+    numbers,
+    picture_size,
+    read_lines,
+    read_text,
+)
 from viewsphere.composing.viewpoints.pose_files.motions import from_quaternion, motion
 from viewsphere.errors import RecipeError
 from viewsphere.geometry.lenses import LensParameters, opencv_parameters
@@ -28,7 +36,7 @@ def read_colmap(path: Path) -> PoseFile:
     `path` is the folder, or its images.txt. COLMAP's world has no defined up axis; usually y points down.
     """
     folder = path if path.is_dir() else path.parent
-    cameras = {int(words[0]): colmap_camera(words, where) for words, where in _camera_lines(folder / "cameras.txt")}
+    cameras = colmap_cameras(_camera_lines(folder / "cameras.txt"))
     images = sorted(_images(folder / "images.txt"), key=lambda image: image[0])
     for name, camera, _ in images:
         if camera not in cameras:
@@ -40,25 +48,36 @@ def read_colmap(path: Path) -> PoseFile:
 def _camera_lines(file: Path) -> list[tuple[list[str], str]]:
     lines = [(words, f"{file}:{line}") for line, words in read_lines(file)]
     for words, where in lines:
-        if len(words) < 5 or not words[0].isdigit():
+        if len(words) < 5 or not IDENTIFIER.fullmatch(words[0]):
             raise RecipeError(f"{where}: expected CAMERA_ID MODEL WIDTH HEIGHT PARAMS; found {len(words)} other words")
     return lines
 
 
-def colmap_camera(words: Sequence[str], where: str) -> Intrinsics:
+def colmap_cameras(lines: Iterable[tuple[Sequence[str], str]]) -> dict[int, Intrinsics]:
+    """The lens of each line CAMERA_ID MODEL WIDTH HEIGHT PARAMS, with the line's place for messages, by the camera's number."""
+    cameras: dict[int, Intrinsics] = {}
+    for words, where in lines:
+        if (camera := int(words[0])) in cameras:
+            raise RecipeError(f"{where}: expected every camera once; found {camera} again: give each its own number")
+        cameras[camera] = _camera(words, where)
+    return cameras
+
+
+def _camera(words: Sequence[str], where: str) -> Intrinsics:
     """The lens of a line CAMERA_ID MODEL WIDTH HEIGHT PARAMS; raises RecipeError, beginning with `where`, for invalid ones."""
     model = words[1]
     if model not in PARAMETERS:
-        raise RecipeError(f"{where}: expected one of {', '.join(PARAMETERS)}; found {model}: undistort the images first")
+        raise RecipeError(f"{where}: expected one of {', '.join(PARAMETERS)}; found {model:.40}: undistort the images first")
     names = PARAMETERS[model][1].split()
-    width, height = numbers(words[2:4], where)
+    width, height = picture_size(words[2], words[3], where)
     p = dict(zip(names, counted(words[4:], len(names), where), strict=True))
     fx = p.get("fx", p.get("f", 0.0))
-    if min(fx, width, height) <= 0:
-        raise RecipeError(f"{where}: expected a size and a focal length above 0; found {' '.join(words[2:5])}")
-    size = {"width": int(width), "height": int(height)}
+    if fx <= 0:
+        raise RecipeError(f"{where}: expected a focal length above 0; found {fx:g}")
     with told_of(where):
-        return Intrinsics(**size, fx=fx, fy=p.get("fy", fx), cx=p["cx"], cy=p["cy"], distortion=_distortion(model, p))
+        return Intrinsics(
+            width=width, height=height, fx=fx, fy=p.get("fy", fx), cx=p["cx"], cy=p["cy"], distortion=_distortion(model, p)
+        )
 
 
 def _distortion(model: str, p: dict[str, float]) -> LensParameters | None:
@@ -93,7 +112,7 @@ def _images(file: Path) -> list[tuple[str, int, Extrinsics]]:
 
 def _image(words: Sequence[str], where: str) -> tuple[str, int, Extrinsics]:
     """IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME: world to camera."""
-    if len(words) < MOST_IN_ONE_LINE or not words[8].isdigit():
+    if len(words) < MOST_IN_ONE_LINE or not IDENTIFIER.fullmatch(words[8]):
         raise RecipeError(f"{where}: expected IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME; found {len(words)} other words")
     number(words[0], where)
     quaternion, t = numbers(words[1:5], where), np.array(numbers(words[5:8], where))

@@ -9,9 +9,14 @@ from pathlib import Path
 
 from viewsphere import files
 from viewsphere.errors import RecipeError
+from viewsphere.recipe.world.scene import LARGEST_IMAGE
+from viewsphere.validation.errors import shown
 
 _ALMOST = re.compile(r"[-+.,0-9eE]{0,24}|[A-Za-z]{1,3}")
 """Pattern of words that messages quote: those meant as numbers. Other words may come from a private file without poses."""
+
+IDENTIFIER = re.compile(r"[0-9]{1,19}")
+"""Pattern of COLMAP's numbers of cameras and images: the digits of 2^63, beyond which Python may refuse to read them."""
 
 
 def read_text(path: Path, of: str = "poses", limit: str = "MAX_POSES_BYTES") -> str:
@@ -44,9 +49,18 @@ def number(word: object, where: str) -> float:
     except (ValueError, OverflowError):
         value = math.nan
     if not math.isfinite(value):
-        found = "a text" if isinstance(word, str) and not _ALMOST.fullmatch(word) else repr(word)
-        raise RecipeError(f"{where}: expected a finite number; found {found:.60}")
+        hidden = "nothing" if word is None else "a text" if isinstance(word, str) and not _ALMOST.fullmatch(word) else None
+        raise RecipeError(f"{where}: expected a finite number; found {hidden or shown(word)}")
     return value
+
+
+def picture_size(width: object, height: object, where: str) -> tuple[int, int]:
+    """Width and height in pixels, within the limits of a recipe's; raises RecipeError, beginning with `where`, for others."""
+    sides = number(width, where), number(height, where)
+    if any(side != int(side) or not 1 <= side <= LARGEST_IMAGE for side in sides):
+        limits = f"whole numbers of pixels from 1 to {LARGEST_IMAGE}"
+        raise RecipeError(f"{where}: expected {limits}; found {shown(width)} and {shown(height)}: set the pictures' size")
+    return int(sides[0]), int(sides[1])
 
 
 def counted(words: Sequence[str], count: int, where: str) -> list[float]:

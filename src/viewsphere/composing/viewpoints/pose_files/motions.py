@@ -21,8 +21,8 @@ RIGHT_ANGLES = 1e-3
 def from_quaternion(wxyz: Sequence[float], where: str) -> Float:
     """The rotation (3, 3) of a quaternion of any length but 0."""
     length = math.hypot(*wxyz)
-    if length < 1e-9:
-        raise RecipeError(f"{where}: expected a quaternion; found one of length 0")
+    if not 1e-9 <= length < math.inf:
+        raise RecipeError(f"{where}: expected a quaternion; found one of length {'0' if length < 1 else 'infinity'}")
     w, x, y, z = (c / length for c in wxyz)
     return matrix_from_quaternion((w, x, y, z))
 
