@@ -13,6 +13,7 @@ from truth_scenes import PARALLEL
 from viewsphere import Dataset, Recipe, generate, plan, plugins
 from viewsphere.check import check
 from viewsphere.errors import RecipeError, UserError
+from viewsphere.geometry.lenses.orthographic import NARROWEST
 from viewsphere.labels.box3d import LABEL
 from viewsphere.model.sensors.camera import Intrinsics
 from viewsphere.plugins.format import FormatSpec
@@ -43,8 +44,9 @@ def test_its_width_gives_square_pixels_and_is_written_as_it_was_given():
 @pytest.mark.parametrize(
     "camera, told",
     [
-        ({"width_m": 0}, "camera.width_m: expected a number greater than 0; found 0"),
-        ({"width_m": -1}, "camera.width_m: expected a number greater than 0; found -1"),
+        ({"width_m": 0}, "camera.width_m: expected a number greater than or equal to 0.000001; found 0"),
+        ({"width_m": -1}, "camera.width_m: expected a number greater than or equal to 0.000001; found -1"),
+        ({"width_m": 1e-300}, "camera.width_m: expected a number greater than or equal to 0.000001; found 1e-300"),
         ({"width_m": float("nan")}, "camera.width_m: expected a finite number; found nan"),
         ({"width_m": float("inf")}, "camera.width_m: expected a finite number; found inf"),
         ({"width_m": None}, "camera.width_m: "),
@@ -56,6 +58,36 @@ def test_a_wrong_camera_is_one_line(camera, told):
     with pytest.raises(RecipeError, match=told) as error:
         parallel_recipe(camera={**CAMERA, **camera})
     assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize(
+    "camera, told",
+    [
+        (
+            {"projection": "orthographic"},
+            "camera: expected width_m beside projection: orthographic; found nothing: set the width in metres that the picture "
+            "spans, at any distance",
+        ),
+        (
+            {"projection": "orthographic", "width_n": 2},
+            "camera.width_n: 'width_n' is unknown; did you mean 'width_m'? Valid: projection, width_m, size",
+        ),
+        ({"width_m": 2}, "camera.width_m: expected projection: orthographic beside it; found none: set projection"),
+        (
+            {"span": {"horizontal": 90}, "fov_deg": 40},
+            "camera.span: expected projection: cylindrical or equirectangular beside it; found none: set projection",
+        ),
+    ],
+)
+def test_an_option_without_its_lens_and_a_lens_without_its_option_are_told(camera, told):
+    with pytest.raises(RecipeError) as error:
+        parallel_recipe(camera=camera)
+    assert str(error.value) == told
+
+
+def test_the_smallest_width_gives_a_data_set_that_passes_check(tmp_path):
+    generate(parallel_recipe(camera={**CAMERA, "width_m": NARROWEST}, formats=[]), tmp_path / "out", workers=0)
+    assert not check(Dataset(tmp_path / "out")).findings
 
 
 STEREO = {"kind": "stereo", "baseline": 0.1}
@@ -76,6 +108,8 @@ STEREO = {"kind": "stereo", "baseline": 0.1}
         ),
         ({"engine": "cycles"}, "engine: expected one that paints parallel rays beside projection: orthographic; found cycles"),
         ({"scene": {"rain": 5}}, "scene.rain: expected off beside projection: orthographic"),
+        ({"variations": {"a": {}, "b": {"rain": 5}}}, "^variations.b.rain: expected off beside projection: orthographic"),
+        ({"variations": {"b": {"effects": {"edge_highlight": 1}}}}, "^variations.b.effects.edge_highlight: expected 0 beside"),
         ({"scene": {"effects": {"depth_of_field": 0.5}}}, "scene.effects.depth_of_field: expected 0 beside projection"),
         ({"scene": {"effects": {"edge_highlight": 0.5}}}, "scene.effects.edge_highlight: expected 0 beside projection"),
     ],

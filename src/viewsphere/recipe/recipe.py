@@ -416,6 +416,11 @@ class Recipe(Shown, Frozen):
         return {name: self.model_copy(update={"scene": scene, "variations": None}) for name, scene in scenes.items()}
 
     @property
+    def varied_scenes(self) -> Mapping[str, SceneEntry]:
+        """The scenes under each variation, by the fields that describe them: `variations.night`, or `scene`."""
+        return {f"variations.{name}" if name else "scene": recipe.scene for name, recipe in self.conditions.items()}
+
+    @property
     def warnings(self) -> tuple[str, ...]:
         """The warnings about fields that are written with a former name."""
         return self._marks.warnings

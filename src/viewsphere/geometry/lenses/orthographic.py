@@ -18,6 +18,11 @@ Float = NDArray[np.float64]
 WIDEST = 1e6
 """Largest width of a picture in metres: float32 pictures of larger scenes would show the rounding of their coordinates."""
 
+NARROWEST = 1e-6
+"""Smallest width of a picture in metres: light shows no details of a smaller scene, and the squares of a pixel's size underflow
+far below it.
+"""
+
 
 class Orthographic(LensParameters, frozen=True):
     """No parameters besides K."""
@@ -29,7 +34,7 @@ class OrthographicOptions(LensOptions, frozen=True):
     """The width of the picture in the scene."""
 
     projection: Literal["orthographic"] = "orthographic"
-    width_m: float = Field(gt=0, le=WIDEST, description="the width in metres that the picture spans, at any distance")
+    width_m: float = Field(ge=NARROWEST, le=WIDEST, description="the width in metres that the picture spans, at any distance")
 
 
 def _calibrate(options: OrthographicOptions, size: tuple[int, int]) -> Calibration:

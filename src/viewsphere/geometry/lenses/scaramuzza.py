@@ -104,7 +104,8 @@ def _radii(c: tuple[float, ...], r: Float, z: Float, angle: Float) -> Float:
         radii[index] = following
         # A step back to an end is rounding, and would go to and fro for ever.
         going = (np.abs(following - rho) > ROUNDED * rho) & (following > low) & (following < high)
-        index, rho, low, high, r, z = (values[going] for values in (index, following, low, high, r, z))
+        index = index[going]
+        rho, low, high, r, z = (values[going] for values in (following, low, high, r, z))
         if not len(index):
             break
     return radii

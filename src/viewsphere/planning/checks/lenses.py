@@ -52,18 +52,17 @@ def _of_pictures(recipe: Recipe, lens: str) -> Iterator[tuple[str, str]]:
             "engine",
             (f"expected one that paints parallel rays beside projection: {lens}; found {recipe.engine.name}: take raster"),
         )
-    for condition in recipe.conditions.values():
-        scene = condition.scene
+    for where, scene in recipe.varied_scenes.items():
         for name in ("rain", "snow"):
             if any(value != "off" for value in alternatives(getattr(scene, name))):
                 yield (
-                    f"scene.{name}",
+                    f"{where}.{name}",
                     f"expected off beside projection: {lens}, whose rays begin far apart; found {name}",
                 )
         for spec, strength in scene.effects.strengths:
             if spec.needs_pinhole and any(span(strength)):
                 found = f"{max(span(strength), key=abs):g}"
                 yield (
-                    f"scene.effects.{spec.name}",
+                    f"{where}.effects.{spec.name}",
                     f"expected 0 beside projection: {lens}, as it is made for a pinhole; found {found}",
                 )

@@ -25,8 +25,8 @@ def check_panoramas(recipe: Recipe, rig: Rig) -> None:
                 where = "channels" if name in recipe.channels else "annotations"
                 raise RecipeError(f"{where}: expected labels that a panorama has; found {name} of {_named(sensor)}: {instead}")
         if lens.period is not None:
-            for name, condition in recipe.conditions.items():
-                _check_seam(f"variations.{name}." if recipe.variations else "scene.", condition.scene, sensor)
+            for where, scene in recipe.varied_scenes.items():
+                _check_seam(where, scene, sensor)
         if recipe.time is not None and recipe.time.shutter and lens.period is not None:
             raise RecipeError(
                 f"time.shutter: expected 0, as motion blur would show the seam of {_named(sensor)}; found "
@@ -41,7 +41,7 @@ def _named(sensor: Sensor) -> str:
 def _check_seam(where: str, scene: SceneEntry, sensor: Sensor) -> None:
     for field, found in _flat(scene):
         raise RecipeError(
-            f"{where}{field}: expected none, as it would show the seam of a full turn, which {_named(sensor)} has; found "
+            f"{where}.{field}: expected none, as it would show the seam of a full turn, which {_named(sensor)} has; found "
             f"{found}: leave it out, or set a smaller span"
         )
 

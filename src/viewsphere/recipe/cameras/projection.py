@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Container, Mapping
 from typing import Annotated, Any, ClassVar, cast
 
 from pydantic import (
@@ -51,6 +51,24 @@ ProjectionField = Annotated[SerializeAsAny[LensOptions], BeforeValidator(_named)
 """The options of a lens. A recipe has its name, and the other options beside it."""
 
 
+def _check_given(name: str, kind: type[LensOptions], given: Mapping[str, Any]) -> None:
+    """Say of an option that is missing what it sets, unless another name is unknown, as then that one may be misspelt."""
+    missing = [option for option, field in kind.model_fields.items() if field.is_required() and option not in given]
+    if missing and given.keys() <= kind.model_fields.keys():
+        meaning = kind.model_fields[missing[0]].description or "it"
+        raise ValueError(f"expected {missing[0]} beside projection: {name}; found nothing: set {meaning}")
+
+
+def _check_unowned(given: Mapping[str, Any], fields: Container[str]) -> None:
+    """Say of an option of lenses that is set without `projection` which ones have it."""
+    unknown = [name for name in given if name not in fields]
+    lenses = _projections() if unknown else {}
+    for option in unknown:
+        if owners := [name for name, kind in lenses.items() if option in kind.model_fields]:
+            with error_at(option):
+                raise ValueError(f"expected projection: {' or '.join(owners)} beside it; found none: set projection")
+
+
 class WithProjection(Frozen):
     """A mapping that may name a lens as `projection`, and then has the lens's options as fields of its own. `LENS` lists the
     fields that describe a lens in another way, which it may not have beside it.
@@ -67,9 +85,12 @@ class WithProjection(Frozen):
     @classmethod
     def _with_options(cls, data: Any) -> Any:
         """Collect the options of the named lens."""
-        if not isinstance(data, Mapping) or cast("Mapping[str, Any]", data).get("projection") is None:
-            return cast(Any, data)
+        if not isinstance(data, Mapping):
+            return data
         given = cast("Mapping[str, Any]", data)
+        if given.get("projection") is None:
+            _check_unowned(given, cls.model_fields)
+            return given
         if isinstance(given["projection"], LensOptions):
             cls._check_alone(given["projection"].projection, given)
             return given
@@ -77,6 +98,7 @@ class WithProjection(Frozen):
         options = {name: value for name, value in given.items() if name in kind.model_fields or name not in cls.model_fields}
         rest = {name: value for name, value in given.items() if name not in options}
         cls._check_alone(given["projection"], rest)
+        _check_given(given["projection"], kind, options)
         shared = [name for name in cls.model_fields if name not in (*cls.LENS, "projection")]
         try:
             return {**rest, "projection": kind.model_validate(options)}
