@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -60,6 +61,15 @@ def test_an_object_across_the_seam_is_two_with_one_id(dataset):
                 assert one.extra.get("seam_piece") == (None if len(pieces) == 1 else 1 + (one is pieces[1]))
 
 
+def test_a_keypoint_is_labelled_in_the_piece_at_whose_side_it_is(dataset):
+    sample, o = across(dataset)[0]
+    begin, end = o.box2d[0], o.box2d[2] - sample.width
+    x = np.array([begin + 0.5, sample.width - 0.5, 0.5, end - 0.5, begin - 1, end + 1, begin + 1, np.nan])
+    points = {"keypoints": np.stack([x, x], axis=1), "keypoint_states": np.array([0, 1, 0, 1, 1, 1, 2, 3])}
+    cut = cut_at_seam(replace(sample, objects=(replace(o, extra={**o.extra, **points}),)))
+    assert [piece.keypoint_states.tolist() for piece in cut.objects] == [[0, 1, 2, 2, 1, 2, 2, 3], [2, 2, 0, 1, 2, 1, 2, 3]]
+
+
 @pytest.mark.parametrize("name", WRITTEN)
 def test_each_format_holds_panoramas_or_refuses_them_in_one_line(name, dataset):
     if not plugins.load(FormatSpec, name).panoramas:
@@ -83,3 +93,10 @@ def test_coco_has_two_annotations_of_an_object_across_the_seam(dataset):
         assert len(mine) == 2 and sum(one["area"] for one in mine) == o.area
         assert {one["bbox"][0] + one["bbox"][2] for one in mine} >= {float(sample.width)}
         assert min(one["bbox"][0] for one in mine) == 0
+        right, left = sorted(mine, key=lambda one: one["id"])
+        in_right, in_left = (np.reshape(one["keypoints"], (-1, 3))[:, 2] > 0 for one in (right, left))
+        labelled = o.keypoint_states < 2
+        assert not (in_right & in_left).any() and (in_right | in_left).sum() == labelled.sum()
+        assert (right["num_keypoints"], left["num_keypoints"]) == (in_right.sum(), in_left.sum())
+        assert all(x > sample.width / 2 for x in np.reshape(right["keypoints"], (-1, 3))[in_right, 0])
+        assert all(x < sample.width / 2 for x in np.reshape(left["keypoints"], (-1, 3))[in_left, 0])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -15,10 +16,14 @@ from viewsphere.model.sample import Box, ObjectAnnotation, Rle, Sample
 PIECE = "seam_piece"
 """The field of `extra` with a piece's number: 1 at the right side of the picture, 2 at its left side."""
 
+OUTSIDE = 2
+"""The state of a keypoint outside the picture: in a piece, that of the keypoints of the other one, so that one alone has it."""
+
 
 def cut_at_seam(sample: Sample) -> Sample:
     """The sample with each object across the seam as two objects with the same id: first the part at the picture's right side.
-    Their masks and boxes are those of the parts; what describes the whole object is the same in both.
+    Their masks and boxes are those of the parts, and each keypoint is outside one of them. What describes the whole object is
+    the same in both.
     """
     period = None if sample.known_camera is None else sample.known_camera.lens.period
     if period is None:
@@ -45,6 +50,8 @@ def _piece(
     if "amodal" in extra:
         whole = decode_rle(o.amodal.height, o.amodal.width, o.amodal.counts) & columns
         extra |= {"amodal": _coded(whole), "box2d_amodal": _floats(mask_box(whole))}
+    if "keypoint_states" in extra and o.box2d is not None:
+        extra["keypoint_states"] = _states(extra, (o.box2d[0] + o.box2d[2] - period) / 2, number)
     return replace(
         o,
         rle=_coded(mask),
@@ -54,6 +61,13 @@ def _piece(
         box2d_unclipped=_moved(o.box2d_unclipped, number, period),
         extra=extra,
     )
+
+
+def _states(extra: Mapping[str, Any], middle: float, number: int) -> NDArray[np.int64]:
+    """The states of keypoints in one piece; `middle` is the x farthest from both pieces, which divides the picture."""
+    x, states = np.reshape(extra["keypoints"], (-1, 2))[:, 0], np.asarray(extra["keypoint_states"], np.int64)
+    is_elsewhere = (x >= middle) != (number == 1)
+    return np.where(is_elsewhere & (states < OUTSIDE), OUTSIDE, states)
 
 
 def _projected_beside(o: ObjectAnnotation, period: int) -> ObjectAnnotation:
