@@ -122,8 +122,8 @@ def parsed(path: Path) -> ast.Module:
     return ast.parse(path.read_text(encoding="utf-8"))
 
 
-UNNAMED = {"lights", "readers"}
-"""Kinds of plug-ins whose names are common words (point, off): tests reach them through the module that loads them."""
+UNNAMED = {"effects", "lights", "readers"}
+"""Kinds of plug-ins whose names are common words (blur, point, off): tests reach them through the module that loads them."""
 
 
 class Modules:
@@ -146,13 +146,14 @@ class Modules:
 
     def _implied(self) -> dict[str, set[str]]:
         """By the module that loads them: the plug-ins that a recipe means without naming them, and the program for Blender."""
-        samplers, readers, lights, lenses, worker = (
+        samplers, readers, lights, lenses, effects, worker = (
             {module for module in self.all if module.startswith(f"{package}.")}
             for package in (
                 SEAMS["samplers"].package,
                 SEAMS["readers"].package,
                 SEAMS["lights"].package,
                 SEAMS["lenses"].package,
+                SEAMS["effects"].package,
                 "viewsphere.blender.worker",
             )
         )
@@ -164,6 +165,7 @@ class Modules:
             "viewsphere.assets.readers": readers,
             "viewsphere.recipe.lights": lights,
             "viewsphere.geometry.lenses": lenses,
+            "viewsphere.recipe.world.effects": effects,
             "viewsphere.planning.checks.models": defaults,
             "viewsphere.run.shots.stages": defaults,
             "viewsphere.blender.process": worker,

@@ -40,8 +40,8 @@ def encode_png(
     """A PNG file of a picture: (H, W) bool (1 bit), uint8 or uint16, or (H, W, 3 or 4) uint8 or uint16, not empty.
 
     With a `palette` (n, 3), (H, W) uint8 are indices of its colours. `unit` is the length in metres of one step of (H, W)
-    (pCAL). For a `rendered` picture with 8-bit colours, only runs are matched, which halves the time; 16-bit ones are filtered,
-    which takes a quarter off the file.
+    (pCAL). For a `rendered` picture in colour, of 8 bits a component, only runs are matched, which halves the time; one of 16
+    bits is filtered, which takes a quarter off the file.
     """
     components = 1 if array.ndim == 2 else array.shape[-1]
     dtypes = (np.bool_, np.uint8, np.uint16) if array.ndim == 2 else (np.uint8, np.uint16)
@@ -60,7 +60,7 @@ def encode_png(
     if rendered and array.dtype == np.uint8 and components > 1:
         body = _zlib(array.reshape(height, -1), components)
     else:
-        body = compressed(_filtered(array, components, rendered))
+        body = compressed(_filtered(array, components, rendered and components > 1))
     return b"".join((_SIGNATURE, _chunk(b"IHDR", header), more, _chunk(b"IDAT", body), _chunk(b"IEND", b"")))
 
 

@@ -321,7 +321,8 @@ class Recipe(Shown, Frozen):
         self._folder = Path((context or {}).get("folder", Path.cwd())).absolute()
         self._marks = (context or {}).get("marks") or Marks()
         if self.camera.lacks_depth and "channels" not in self.model_fields_set:
-            self.__dict__["channels"] = tuple("depth_ray" if name == "depth" else name for name in self.channels)
+            channels = tuple("depth_ray" if name == "depth" else name for name in self.channels)
+            object.__setattr__(self, "channels", channels)  # stays a default: not among the fields that were set
 
     @contextmanager
     def located(self) -> Generator[None]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -122,7 +123,7 @@ class Query:
             conditions.append(lambda: objects["model"] == _code(table.models, self.model))
         if self.pose:
             conditions.append(lambda: objects["pose"] == _code(table.poses, "" if self.pose == "unknown" else self.pose))
-        conditions += [lambda one=one: _is_within(objects, one) for one in self._of_frames(False)]
+        conditions += [partial(_is_within, objects, one) for one in self._of_frames(False)]
         if not conditions:
             return None
         met = np.ones(len(objects), bool)

@@ -308,4 +308,4 @@ def _shifts(baked: Baked, camera: Camera, samples: Samples | None) -> Float32:
     # The places are linear in the picture, so those of its first row and first column give all.
     x, y = np.arange(camera.width) + 0.5, np.arange(camera.height) + 0.5
     row, column = begin(np.column_stack([x, np.full_like(x, 0.5)])), begin(np.column_stack([np.full_like(y, 0.5), y]))
-    return (row + (column - column[:1])[:, None]).reshape(-1, 3)
+    return (row + (column - column[:1])[:, None]).reshape(-1, 3).astype(np.float32, copy=False)
