@@ -511,9 +511,8 @@ def test_a_package_of_a_kind_that_there_is_not_is_listed_with_the_one_that_was_m
     monkeypatch.setattr(plugin_list, "names", lambda _kind: ())
     (found,) = overview()
     assert (found.kind, found.name, found.distribution) == ("viewsphere.packages", "odd_kinds", "odd_kinds 1.0")
-    assert found.error.startswith(
-        "viewsphere.packages: 'family' is unknown; did you mean 'families'? Valid: engines, families,"
-    )
+    assert found.error.startswith("viewsphere.packages: 'family' is unknown; did you mean 'families'? Valid: ")
+    assert ", families," in found.error
 
 
 @pytest.mark.slow

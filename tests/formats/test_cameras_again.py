@@ -229,7 +229,7 @@ def spoil(scene, what):
             (scene / "sparse/0/cameras.bin").write_bytes(data)
         case "model":
             data = bytearray((scene / "sparse/0/cameras.bin").read_bytes())
-            data[12:16] = struct.pack("<i", 7)
+            data[12:16] = struct.pack("<i", 999)
             (scene / "sparse/0/cameras.bin").write_bytes(data)
         case "pose":
             said.write_text(json.dumps({"w": 4, "h": 4, "fl_x": 4, "frames": [{"file_path": "a.png"}]}))
