@@ -163,6 +163,15 @@ def test_fisheye_round_trip(k1, k2, k3, k4):
     assert is_shown[inner].all() and not is_shown[~real].any()
 
 
+def test_fisheye_round_trip_where_newton_s_method_alone_jumps_for_ever():
+    lens = fisheye(0.0, 0.02, 0.0025, -0.001)
+    i = intrinsics(lens, 4, 4, fx=1.0, fy=1.0, cx=0.0, cy=0.0, skew=0.0)
+    theta = np.linspace(0.01, lens_limit(lens) - 1e-6, 20_001)
+    radius = theta * (1 + 0.02 * theta**4 + 0.0025 * theta**6 - 0.001 * theta**8)
+    rays = i.lens.rays(np.stack([radius, np.zeros_like(radius)], axis=-1)).directions
+    np.testing.assert_allclose(np.arctan2(rays[:, 0], rays[:, 2]), theta, atol=1e-7)
+
+
 def test_equidistant_fisheye_in_closed_form():
     i = intrinsics(fisheye(0.0, 0.0, 0.0, 0.0), 401, 1, fx=100.0, fy=100.0, cx=200.5, cy=0.5, skew=0.0)
     angle = (np.arange(401) - 200) / 100

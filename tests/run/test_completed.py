@@ -46,7 +46,7 @@ def test_what_is_computed_is_what_would_have_been_kept(world, request, tmp_path_
     kept = request.getfixturevalue("few" if world == "stills" else "few_moving")
     wanted = [name for name in whole.plan.channels if name not in ("rgb", "tracks")]
     asked = [name for name in whole.recipe["annotations"] if name not in ("captions",)]
-    completed = Completed(kept, None, None, (*wanted, *asked))
+    completed = Completed(kept, None, None, (*wanted, *asked), False)
     assert len(list(completed.shots())) > len(list(whole.shots())) or world == "stills"
     for ours, theirs in zip(completed, whole, strict=True):
         for name in wanted:
@@ -110,7 +110,7 @@ def test_what_an_unfinished_neighbour_would_tell_is_asked_for(few_moving, tmp_pa
     dataset = Dataset(shutil.copytree(few_moving, tmp_path / "few"))
     second = [key for key, _ in dataset.shots()][1]
     shutil.rmtree(dataset.store.shot_folder(second))
-    completed = Completed(tmp_path / "few", None, None, ("flow",))
+    completed = Completed(tmp_path / "few", None, None, ("flow",), False)
     with pytest.raises(StoreError, match="beside it, with which labels compare it, found it unfinished: render the rest first"):
         _ = [sample.flow for sample in completed]
     export(tmp_path / "few", "pointcloud", output=tmp_path / "out")  # depth needs no other instant

@@ -58,7 +58,7 @@ def invert_radial(k, fisheye, target, limit):
     r = min(target, high)
     if (radial_fisheye(k, high) if fisheye else radial_brown(k, high))[0] < target:
         return np.nan
-    for _ in range(200):
+    for number in range(200):
         value, slope = radial_fisheye(k, r) if fisheye else radial_brown(k, r)
         if value < target:
             low = r
@@ -66,7 +66,8 @@ def invert_radial(k, fisheye, target, limit):
             high = r
         step = (target - value) / slope if slope > 0.0 else np.inf
         following = r + step
-        if not low <= following <= high:
+        # Newton's method may jump between both ends for ever, so bisection follows its first 60 steps.
+        if not low <= following <= high or number >= 60:
             following = 0.5 * (low + high)
         if abs(following - r) <= TOLERANCE * r:
             return following
