@@ -64,7 +64,7 @@ def view_of(rotation, rays=None) -> PictureRays:
         "pixel": np.float32(0),
         "scale": np.float32(1),
     }
-    return PictureRays(**{name: values[name] for name in PictureRays._fields})
+    return PictureRays(**{name: values[name] for name in PictureRays._fields if name in values})
 
 
 FRONT = view_of([[1, 0, 0], [0, 0, -1], [0, 1, 0]])  # looks along +Y, x to the right, image down is -Z

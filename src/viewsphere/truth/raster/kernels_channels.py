@@ -250,14 +250,14 @@ def normals_shading(seen, triangles, q, rays, values, side, triangle_normals, ca
             if t == last:
                 out[uy, ux, a], out[uy, ux, b], out[uy, ux, c] = nx, ny, nz
                 continue
-            soon = np.uintp(max(seen[uy, min(ux + SOON, np.uintp(width) - b)], np.int32(0)))
-            for k in (a, b, c):
-                prefetch(q, four * np.uintp(triangles[soon, k]))
-                prefetch(values, three * np.uintp(triangles[soon, k]))
             if t < 0:
                 last, nx, ny, nz = -1, 0.0, 0.0, 0.0
                 out[uy, ux, a], out[uy, ux, b], out[uy, ux, c] = nx, ny, nz
                 continue
+            soon = np.uintp(max(seen[uy, min(ux + SOON, np.uintp(width) - b)], np.int32(0)))
+            for k in (a, b, c):
+                prefetch(q, four * np.uintp(triangles[soon, k]))
+                prefetch(values, three * np.uintp(triangles[soon, k]))
             ut = np.uintp(t)
             px, py, pz = (rays[uy, ux, a], rays[uy, ux, b], rays[uy, ux, c]) if table else (x + 0.5, y + 0.5, 1.0)
             i0, i1, i2 = np.uintp(triangles[ut, a]), np.uintp(triangles[ut, b]), np.uintp(triangles[ut, c])
