@@ -10,13 +10,18 @@ server:/home /home nfs4 rw 0 0
 tmpfs /home/me/fast tmpfs rw 0 0
 //server/share /mnt/a\040b cifs rw 0 0
 x /srv fuse.sshfs rw 0 0
+server:/data /mnt/dätä nfs4 rw 0 0
+server:/other /mnt/twice nfs4 rw 0 0
+/dev/sdb1 /mnt/twice ext4 rw 0 0
+/dev/sdb2 /mnt/hidden ext4 rw 0 0
+server:/third /mnt/hidden nfs4 rw 0 0
 broken
 """
 
 
 @pytest.fixture(autouse=True)
 def table(tmp_path, monkeypatch):
-    (tmp_path / "mounts").write_text(TABLE)
+    (tmp_path / "mounts").write_text(TABLE, encoding="utf-8")
     monkeypatch.setattr(arrays, "MOUNTS", tmp_path / "mounts")
     arrays._mounts.cache_clear()
     yield tmp_path / "mounts"
@@ -33,6 +38,9 @@ def table(tmp_path, monkeypatch):
         ("/homes/a", True),
         ("/mnt/a b/c", False),
         ("/srv/a", False),
+        ("/mnt/dätä/a", False),
+        ("/mnt/twice/a", True),
+        ("/mnt/hidden/a", False),
     ],
 )
 def test_the_longest_mount_decides(file, is_local):

@@ -48,6 +48,7 @@ LINE = 64
 _DIGEST_BYTES, _LENGTH_BYTES = 16, 8
 _START = len(MAGIC) + _DIGEST_BYTES
 _NUMBERS = re.compile("[<>|][biuf][1248]")
+_OCTAL = re.compile(r"\\([0-7]{3})")  # a blank, tab, line end or backslash in the table of mounts, see fstab(5)
 """numpy's names of the dtypes that arrays may have. Other texts are rejected, since numpy might interpret them in unforeseen
 ways.
 """
@@ -156,13 +157,15 @@ def is_local(file: Path) -> bool:
 
 @cache
 def _mounts() -> tuple[tuple[str, str], ...]:
-    """The folder and the type of each mounted file system; empty if the system lists none."""
+    """The folder and the type of each mounted file system, the latest first, as it hides earlier ones at its folder; empty if
+    the system lists none.
+    """
     try:
         lines = read_text(MOUNTS, "MAX_TABLE_BYTES").splitlines()
     except (OSError, ValueError):
         return ()
-    fields = (line.split(" ") for line in lines)
-    return tuple((part[1].encode().decode("unicode_escape"), part[2]) for part in fields if len(part) > 2)
+    fields = [line.split(" ") for line in lines]
+    return tuple((_OCTAL.sub(lambda code: chr(int(code[1], 8)), part[1]), part[2]) for part in fields[::-1] if len(part) > 2)
 
 
 def _is_below(path: str, folder: str) -> bool:
