@@ -159,6 +159,7 @@ class LensProofs:
         if is_whole:
             assert (np.array(box[:2]) >= low - scale).all() and (np.array(box[2:]) <= high + scale).all()
 
+    @pytest.mark.slow
     def test_labels_are_those_of_embree_s_rays_on_a_zoo_scene(self):
         pytest.importorskip("embreex")
         rng = np.random.default_rng(8)
@@ -173,6 +174,7 @@ class LensProofs:
         assert len(errors) > 1000 and toss_ups < 2e-3 * 60000 and overruled < 1e-3 * 60000
         assert np.quantile(errors, 0.999) <= 1e-4
 
+    @pytest.mark.slow
     def test_a_data_set_passes_check(self, tmp_path):
         own = self.parameters(np.random.default_rng(2))
         camera = {"size": [96, 72], "focal_px": self.focal * 0.15, "distortion": own.model_dump(mode="json")}

@@ -85,6 +85,7 @@ def test_an_option_without_its_lens_and_a_lens_without_its_option_are_told(camer
     assert str(error.value) == told
 
 
+@pytest.mark.slow
 def test_the_smallest_width_gives_a_data_set_that_passes_check(tmp_path):
     generate(parallel_recipe(camera={**CAMERA, "width_m": NARROWEST}, formats=[]), tmp_path / "out", workers=0)
     assert not check(Dataset(tmp_path / "out")).findings
