@@ -62,6 +62,9 @@ def test_the_table_is_in_order_and_its_kernels_are_there():
         kernel = getattr(import_module(each.module), each.kernel)
         kinds = overloads.decoded(json.loads(each.types))
         assert len(kinds) == len(inspect.signature(kernel.py_func).parameters), f"{each.name}: run scripts/kernels --add"
+        for kind in kinds:
+            if isinstance(kind, types.BaseNamedTuple):
+                assert len(kind.types) == len(kind.fields), f"{each.name}: run scripts/kernels --add"
 
 
 def test_what_a_shot_needs_is_decided_by_its_features():
