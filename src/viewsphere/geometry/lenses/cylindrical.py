@@ -5,15 +5,11 @@ from __future__ import annotations
 import math
 from typing import Literal
 
-import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field
 
-from viewsphere.geometry.lenses import Bounds, Calibration, Lens, LensOptions, LensParameters, LensSpec, Rays
+from viewsphere.geometry.lenses import Calibration, LensOptions, LensParameters, LensSpec
 from viewsphere.geometry.lenses.shared import panorama
 from viewsphere.geometry.lenses.shared.panorama import Span, SpanField
-
-Float = NDArray[np.float64]
 
 LIMIT = math.radians(89.9)
 """The highest elevation, radians: a cylinder has no pixel for straight up. Spans end below it."""
@@ -46,35 +42,10 @@ def _calibrate(options: Options, size: tuple[int, int]) -> Calibration:
         raise ValueError(f"expected a vertical span of at most {TALLEST:g} degrees; found {down:g}")
     half = math.tan(math.radians(down) / 2)
     span = Span(horizontal=options.span.horizontal, vertical=down)
-    panorama.matching_height(size, 2 * focal * half, span)
+    panorama.check_height(size, 2 * focal * half, span)
     return Calibration(focal, height / (2 * half), width / 2, height / 2, Cylindrical())
 
 
-def _rays(lens: Lens, xy: Float) -> Rays:
-    """Unit rays in every direction but straight up and down."""
-    return panorama.rays(lens, xy, LIMIT, True)
-
-
-def _project(lens: Lens, points: Float) -> Float:
-    """Positions of points below the limit of elevation."""
-    return panorama.project(lens, points, LIMIT, True)
-
-
-def _bounds(
-    lens: Lens, R: Float, t: Float, vertices: Float, is_used: NDArray[np.bool_], triangles: NDArray[np.int32]
-) -> tuple[Bounds | None, bool]:
-    """The shortest box around the circle, of the triangles' parts below the limit of elevation."""
-    return panorama.bounds(lens, (R, t), (vertices, is_used, triangles), LIMIT, True)
-
-
 LENS = LensSpec(
-    parameters=Cylindrical,
-    options=Options,
-    calibrate=_calibrate,
-    rays=_rays,
-    project=_project,
-    has_depth=False,
-    period=panorama.period,
-    bounds=_bounds,
-    field_of_view=panorama.field_of_view,
+    parameters=Cylindrical, options=Options, calibrate=_calibrate, **panorama.panorama_functions(LIMIT, is_cylinder=True)
 )

@@ -5,15 +5,12 @@ from __future__ import annotations
 import math
 from typing import Literal
 
-import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field
 
-from viewsphere.geometry.lenses import Bounds, Calibration, Lens, LensOptions, LensParameters, LensSpec, Rays
+from viewsphere.geometry.lenses import Calibration, LensOptions, LensParameters, LensSpec
 from viewsphere.geometry.lenses.shared import panorama
 from viewsphere.geometry.lenses.shared.panorama import Span, SpanField
 
-Float = NDArray[np.float64]
 LIMIT = math.pi / 2
 """The highest elevation, radians."""
 
@@ -42,35 +39,10 @@ def _calibrate(options: Options, size: tuple[int, int]) -> Calibration:
         fix = f": set size: [{width}, {max(round(width * 180 / across), 1)}]" if options.span.vertical is None else ""
         raise ValueError(f"expected a vertical span of at most 180 degrees; found {down:g}{fix}")
     span = Span(horizontal=across, vertical=down)
-    panorama.matching_height(size, width * down / across, span)
+    panorama.check_height(size, width * down / across, span)
     return Calibration(width / math.radians(across), height / math.radians(down), width / 2, height / 2, Equirectangular())
 
 
-def _rays(lens: Lens, xy: Float) -> Rays:
-    """Unit rays in every direction."""
-    return panorama.rays(lens, xy, LIMIT, False)
-
-
-def _project(lens: Lens, points: Float) -> Float:
-    """Positions of points in all directions; straight up and down are in the middle of the first and the last row."""
-    return panorama.project(lens, points, LIMIT, False)
-
-
-def _bounds(
-    lens: Lens, R: Float, t: Float, vertices: Float, is_used: NDArray[np.bool_], triangles: NDArray[np.int32]
-) -> tuple[Bounds | None, bool]:
-    """The shortest box around the circle."""
-    return panorama.bounds(lens, (R, t), (vertices, is_used, triangles), LIMIT, False)
-
-
 LENS = LensSpec(
-    parameters=Equirectangular,
-    options=Options,
-    calibrate=_calibrate,
-    rays=_rays,
-    project=_project,
-    has_depth=False,
-    period=panorama.period,
-    bounds=_bounds,
-    field_of_view=panorama.field_of_view,
+    parameters=Equirectangular, options=Options, calibrate=_calibrate, **panorama.panorama_functions(LIMIT, is_cylinder=False)
 )

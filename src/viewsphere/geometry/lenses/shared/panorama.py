@@ -45,41 +45,59 @@ SpanField = Annotated[
 ]
 
 
-def matching_height(size: tuple[int, int], height: float, span: Span) -> float:
-    """The height of a picture whose pixels are square in its middle. Raises ValueError if the picture's height differs from it
-    by more than half a pixel.
-    """
+def check_height(size: tuple[int, int], height: float, span: Span) -> None:
+    """Raise ValueError if a picture's height differs by more than half a pixel from that with square pixels in its middle."""
     if abs(size[1] - height) > 0.5:
         raise ValueError(
             f"expected square pixels: a size of {size[0]} x {max(round(height), 1)} for a span of {span.horizontal:g} x "
             f"{span.vertical:g} degrees; found {size[0]} x {size[1]}"
         )
-    return float(size[1])
 
 
-def period(lens: Lens) -> int | None:
+def panorama_functions(limit: float, is_cylinder: bool) -> dict[str, Any]:
+    """The functions of a `LensSpec` that shows all azimuths, and elevations up to `limit`, radians. Rows are tangents of
+    elevations on a cylinder, and elevations otherwise.
+    """
+
+    def rays(lens: Lens, xy: Float) -> Rays:
+        from viewsphere.geometry.lenses.shared import kernels_panorama as kernels
+
+        out = np.empty((len(xy), 3))
+        kernels.rays(is_cylinder, limit, lens.intrinsics.K, xy, out)
+        return central(out)
+
+    def project(lens: Lens, points: Float) -> Float:
+        return _project(lens, points, limit, is_cylinder)
+
+    def bounds(
+        lens: Lens, R: Float, t: Float, vertices: Float, is_used: NDArray[np.bool_], triangles: NDArray[np.int32]
+    ) -> tuple[Bounds | None, bool]:
+        return _bounds(lens, (R, t), (vertices, is_used, triangles), limit, is_cylinder)
+
+    return {
+        "rays": rays,
+        "project": project,
+        "bounds": bounds,
+        "has_depth": False,
+        "period": _period,
+        "field_of_view": _field_of_view,
+    }
+
+
+def _period(lens: Lens) -> int | None:
     """The picture's width if it shows a full turn."""
     i = lens.intrinsics
     return i.width if abs(TURN * i.fx - i.width) <= CLOSED else None
 
 
-def rays(lens: Lens, xy: Float, limit: float, is_cylinder: bool) -> Rays:
-    """Unit rays; NaN beyond a full turn around the middle, and beyond the elevation `limit`, radians."""
-    from viewsphere.geometry.lenses.shared import kernels_panorama as kernels
-
-    out = np.empty((len(xy), 3))
-    kernels.rays(is_cylinder, limit, lens.intrinsics.K, xy, out)
-    return central(out)
-
-
-def project(lens: Lens, points: Float, limit: float, is_cylinder: bool) -> Float:
+def _project(lens: Lens, points: Float, limit: float, is_cylinder: bool) -> Float:
     """Positions of points in all directions up to the elevation `limit`."""
     from viewsphere.geometry.lenses.shared import kernels_panorama as kernels
 
     out = np.empty((len(points), 2))
     kernels.project(is_cylinder, limit, points, out)
     xy = lens.positions(*out.T)
-    turn = period(lens)
+    turn = _period(lens)
     if turn is not None:
         x = xy[:, 0]
         x[x < 0.0] += turn
@@ -88,7 +106,7 @@ def project(lens: Lens, points: Float, limit: float, is_cylinder: bool) -> Float
     return xy
 
 
-def bounds(
+def _bounds(
     lens: Lens,
     view: tuple[Float, Float],
     surface: tuple[Float, NDArray[np.bool_], NDArray[np.int32]],
@@ -107,7 +125,7 @@ def bounds(
     lowest, highest = max(lowest, -limit), min(highest, limit)
     if lowest > highest:
         return None, False
-    turn = period(lens)
+    turn = _period(lens)
     circle = TURN * i.fx if turn is None else float(turn)
     azimuths = np.array([[left, right]]) if lies == 0 else _edges(room[:, 4][triangles])
     starts, ends = np.mod(i.fx * azimuths + i.cx, circle).T
@@ -127,7 +145,7 @@ def _edges(corners: Float) -> Float:
     return np.where(turned[:, None] < 0, np.stack((b, a), axis=1), np.stack((a, b), axis=1))
 
 
-def field_of_view(lens: Any) -> tuple[float, float]:
+def _field_of_view(lens: Any) -> tuple[float, float]:
     """The angles across and from top to bottom."""
     i = lens.intrinsics
     ends = lens.rays([[i.cx, 0.0], [i.cx, float(i.height)]]).directions
