@@ -10,7 +10,7 @@ DEADLINE = 300
 
 
 def until(true: Callable[[], object]) -> bool:
-    """Whether this becomes true before the deadline; asked about it again and again."""
+    """Return whether this becomes true before the deadline; asked about it again and again."""
     end = time.monotonic() + DEADLINE
     while not true():
         if time.monotonic() > end:

@@ -146,7 +146,7 @@ class Tally:
 
     @property
     def is_good(self) -> bool:
-        """Whether nothing was lost, and all was as it should be."""
+        """Return whether nothing was lost, and all was as it should be."""
         return not (self.lost or self.torn or self.unequal or self.untidy)
 
 

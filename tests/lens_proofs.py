@@ -72,7 +72,7 @@ def assert_formula(own: LensParameters, focal: float, formula, rng: np.random.Ge
 
 
 class LensProofs:
-    """What every lens has to fulfil. A subclass gives random parameters, and a focal length in pixels for a picture of 640 x
+    """Properties of every lens. A subclass gives random parameters, and a focal length in pixels for a picture of 640 x
     480, at which the lens shows most of the picture.
     """
 

@@ -47,7 +47,7 @@ def planes(geometry, camera, triangle, rays):
 
 
 def right_by_float64(geometry, camera, ray, triangle):
-    """Whether brute force in float64 finds this triangle first along the ray."""
+    """Return whether brute force in float64 finds this triangle first along the ray."""
     x = geometry.vertices @ camera.R.T + camera.t
     a, b, c = (x[geometry.triangles[:, k]] for k in range(3))
     with np.errstate(all="ignore"):

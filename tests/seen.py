@@ -21,15 +21,15 @@ def changed(before, after) -> float:
 
 
 def looks(place, true) -> bool:
-    """Whether a place comes to look so that `true(pixels)`."""
+    """Return whether a place comes to look so that `true(pixels)`."""
     return until(lambda: true(pixels(place)))
 
 
 def differs(place, before, share) -> bool:
-    """Whether more than this share of a place's pixels comes to differ."""
+    """Return whether more than this share of a place's pixels comes to differ."""
     return looks(place, lambda after: changed(before, after) > share)
 
 
 def equals(place, before, share) -> bool:
-    """Whether less than this share of a place's pixels comes to differ."""
+    """Return whether less than this share of a place's pixels comes to differ."""
     return looks(place, lambda after: changed(before, after) < share)

@@ -363,7 +363,7 @@ def test_blender_s_engines_paint_them_too(engine):
 
 @pytest.mark.parametrize(("kind", "deep", "suffix"), [("exr", "rgb_linear", ".exr"), ("png16", "rgb16", ".png")])
 def test_a_deep_picture_that_channels_name_stays_beside_a_transparent_background(tmp_path, kind, deep, suffix):
-    """As the refusal without it advises."""
+    """The refusal of the recipe without it advises this."""
     given = {"scene": {"background": "transparent"}, "files": {"rgb": kind}, "viewpoints": {"distance": 1.0}, "formats": []}
     with pytest.raises(UserError, match=f"name {deep} in channels"):
         plan(small_recipe(channels=["rgb"], **given))

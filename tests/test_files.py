@@ -186,7 +186,7 @@ def named(node):
 
 
 def opens(call):
-    """Whether a call opens a path to read it."""
+    """Return whether a call opens a path to read it."""
     if isinstance(call.func, ast.Name):
         return call.func.id in ("open", "ZipFile", "iterparse")
     if not isinstance(call.func, ast.Attribute):

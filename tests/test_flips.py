@@ -61,7 +61,7 @@ def flips(file, count):
 
 
 def is_noticed(dataset, file):
-    """Whether the proofs of digests, which `check` begins with, see that a file was changed."""
+    """Return whether the proofs of digests, which `check` begins with, see that a file was changed."""
     inside = file.relative_to(dataset.root).parts
     if inside[0] != "store":
         return any(damaged_files(dataset.root / inside[0]))

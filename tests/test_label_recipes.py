@@ -55,7 +55,7 @@ def test_a_label_s_recipe_makes_a_data_set_that_passes(file, tmp_path):
 
 
 def changes_the_picture(sample, source):
-    """Whether a label's drawing shows anything, over the picture or beside it."""
+    """Return whether a label's drawing shows anything, over the picture or beside it."""
     plain, drawn = draw_sample(sample), draw_sample(sample, [drawable()[source].name])
     return plain.shape != drawn.shape or (plain != drawn).any()
 

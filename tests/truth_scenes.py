@@ -104,7 +104,7 @@ def least_weight(geometry: Geometry, u, v):
 
 
 def begins(camera, world):
-    """Where the rays to points (N, 3) begin."""
+    """The origins of the rays to points (N, 3)."""
     if not camera.lens.is_parallel:
         return np.broadcast_to(camera.center, world.shape)
     return world - (world @ camera.R[2] + camera.t[2])[:, None] * camera.R[2]

@@ -21,7 +21,7 @@ LABELS = [
 
 
 def is_still(label: LabelSpec) -> bool:
-    """Whether pictures of one camera that stand alone have the label."""
+    """Return whether pictures of one camera that stand alone have the label."""
     return not any(need.SECTION for need in label.needs)
 
 

@@ -78,7 +78,7 @@ def changed(value, where):
 
 
 def found(prove):
-    """Whether anything is found, or the text cannot be read, which every command reports."""
+    """Return whether anything is found, or the text cannot be read, which every command reports."""
     try:
         return list(prove())
     except Exception as error:

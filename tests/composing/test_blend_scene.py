@@ -144,7 +144,7 @@ def in_turn(recipe):
 
 @pytest.mark.parametrize("count", [3, 4])
 def test_variants_take_turns_along_poses_that_move(planes, count):
-    """Whether the poses are odd in number or even; the second model goes on where the first ends."""
+    """Return whether the poses are odd in number or even; the second model goes on where the first ends."""
     blend = {"frames": list(range(1, count + 1)), "poses": "moving"}
     turns = in_turn(planes(count, ("zoo:chair", "zoo:car"), blend))
     assert turns == [k % 2 for k in range(2 * count)]

@@ -76,7 +76,7 @@ def test_no_ray_passes_where_triangles_meet(way, height):
 
 
 def meets(corners, origin, way):
-    """Whether a ray meets any triangle (T, 3, 3), in float32 (Moeller and Trumbore)."""
+    """Return whether a ray meets any triangle (T, 3, 3), in float32 (Moeller and Trumbore)."""
     a, b, c = corners.transpose(1, 0, 2)
     with np.errstate(all="ignore"):
         p, s = cross(way, c - a), origin - a

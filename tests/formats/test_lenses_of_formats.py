@@ -75,7 +75,7 @@ def encodings(value: float) -> tuple[bytes, ...]:
 
 
 def leaves_it_out(name: str) -> bool:
-    """Whether the format's page says that it does not store the distortion."""
+    """Return whether the format's page says that it does not store the distortion."""
     told = " ".join((plugins.load(FormatSpec, name).about or "").split())
     return "Not stored:" in told and "the lens' distortion" in told
 

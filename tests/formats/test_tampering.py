@@ -34,7 +34,7 @@ from viewsphere.store.shots.checksums import CHECKSUMS
 
 
 def _proves_itself(module) -> bool:
-    """Whether a format has a proof of its own; trees share one, which test_trees.py tries."""
+    """Return whether a format has a proof of its own; trees share one, which test_trees.py tries."""
     return module.verify is not None and module.verify.__module__ != "viewsphere.formats.shared.writing.tree"
 
 

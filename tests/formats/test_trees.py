@@ -153,7 +153,7 @@ def told(dataset, name, folder):
 
 
 def is_named(path, messages):
-    """Whether a message begins with a file's whole path, which names no other."""
+    """Return whether a message begins with a file's whole path, which names no other."""
     return any(message.startswith(f"{path.as_posix()}: ") for message in messages)
 
 

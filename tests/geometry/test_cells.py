@@ -24,7 +24,7 @@ def clipped(polygon, axis, value, sign):
 
 
 def overlaps(triangle, cell):
-    """Whether a triangle has a part in a closed cell."""
+    """Return whether a triangle has a part in a closed cell."""
     polygon = list(triangle)
     for axis in range(3):
         for value, sign in ((cell[axis], 1), (cell[axis] + 1, -1)):

@@ -111,7 +111,7 @@ class Thing:
         return self.o.box3d.max(axis=0)
 
     def fits(self, color, material):
-        """Whether words for colour and material, empty without, hold of it."""
+        """Return whether words for colour and material, empty without, hold of it."""
         return color in ("", self.words[0]) and material in ("", self.words[1])
 
 
@@ -155,7 +155,7 @@ class World:
         )
 
     def holds(self, one, words, two):
-        """Whether a relation of one thing to another holds."""
+        """Return whether a relation of one thing to another holds."""
         (ax0, ay0, ax1, ay1), (bx0, by0, bx1, by1) = one.o.box2d, two.o.box2d
         match words:
             case "to the left of":

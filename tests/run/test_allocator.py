@@ -70,7 +70,7 @@ FRAME, LARGE = "(480, 640, 3), 16", "(4096, 4096), 4"  # 59 MB in all; 268 MB, e
 
 
 def answered(script, *arguments, **environment):
-    """Whether the allocator was told, and the script's two numbers."""
+    """Return whether the allocator was told, and the script's two numbers."""
     kept = {name: value for name, value in os.environ.items() if not name.startswith(("MALLOC_", "GLIBC_"))}
     command = [sys.executable, "-c", script, *arguments]
     told, *numbers = subprocess.run(command, env=kept | environment, capture_output=True, text=True, check=True).stdout.split()

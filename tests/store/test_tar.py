@@ -52,7 +52,7 @@ def shards(root):
 
 
 def equal(one, other):
-    """Whether two data sets hold equal frames."""
+    """Return whether two data sets hold equal frames."""
     assert len(one) == len(other) > 0
     for a, b in zip(one, other, strict=True):
         assert [o.rle for o in a.objects] == [o.rle for o in b.objects]

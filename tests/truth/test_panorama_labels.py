@@ -109,7 +109,7 @@ def test_embree_sees_the_same_of_real_models(name):
 
 
 def test_a_quarter_turn_of_the_camera_moves_all_columns_by_a_quarter():
-    """About the camera's own vertical axis: ids and distances are the same, but for rays along edges."""
+    """Ids and distances turn with the camera about its vertical axis, except at rays along edges."""
     geometry, own = surroundings(), lens("equirectangular", 3)
     first = orbit_camera(own, 0.3, 0.1, 0.4)
     turn = np.array([[0.0, 0, -1], [0, 1, 0], [1, 0, 0]])  # the right side comes ahead

@@ -88,8 +88,8 @@ def expected_states(there, world, own):
 
 
 def brute_hidden(there, world, own, chunk=512):
-    """Whether each point (N, 3) is hidden in a view, and the least of |weights| and of |gap - 1e-6| over all triangles: where
-    this is tiny, rounding decides. `own` (N,): the triangle left out; of the ground both of its halves are.
+    """Return whether each point (N, 3) is hidden in a view, and the least of |weights| and of |gap - 1e-6| over all triangles:
+    where this is tiny, rounding decides. `own` (N,): the triangle left out; of the ground both of its halves are.
     """
     geometry = there.geometry
     begin = begins(there.camera, world)

@@ -27,7 +27,7 @@ def looking(root):
 
 
 def read(live, frames):
-    """Whether so many frames come to have columns, and no more."""
+    """Return whether so many frames come to have columns, and no more."""
     return until(lambda: live.state()["read"] >= frames) and live.state()["read"] == frames
 
 

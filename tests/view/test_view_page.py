@@ -31,14 +31,14 @@ def cards(page):
 
 
 def whole(page):
-    """Whether the wall has a card for each place in sight, and none waits."""
+    """Return whether the wall has a card for each place in sight, and none waits."""
     found = cards(page)
     places = [place for place, _ in found]
     return bool(found) and places == [*range(places[0], places[-1] + 1)] and all(frame is not None for _, frame in found)
 
 
 def in_order(page, first=None):
-    """Whether the pictures are those of the plan, in its order, with this frame at their head."""
+    """Return whether the pictures are those of the plan, in its order, with this frame at their head."""
     return whole(page) and all(place == frame for place, frame in cards(page)) and first in (None, cards(page)[0][1])
 
 

@@ -166,7 +166,7 @@ def test_spokes_are_laced_evenly_and_cross_as_often_as_asked(spokes: int, crosse
 
 
 def crossing(a: np.ndarray, b: np.ndarray, c: np.ndarray, d: np.ndarray) -> bool:
-    """Whether the segments a b and c d meet."""
+    """Return whether the segments a b and c d meet."""
 
     def side(p: np.ndarray, q: np.ndarray, r: np.ndarray) -> float:
         return float((q[0] - p[0]) * (r[1] - p[1]) - (q[1] - p[1]) * (r[0] - p[0]))

@@ -39,7 +39,7 @@ def test_draws_are_sound_of_real_size_and_differ(family: str) -> None:
 
 
 def rising(mesh, part: str, above: float) -> bool:
-    """Whether some face of the part looks up and lies at least so high above the ground."""
+    """Return whether some face of the part looks up and lies at least so high above the ground."""
     own = mesh.triangles[mesh.triangle_part == mesh.parts.index(part)]
     corners = mesh.vertices[own].astype(np.float64)
     area = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])

@@ -18,7 +18,7 @@ def png(pixels):
 
 
 def holds(triangle, x, y):
-    """Whether points lie inside a triangle, by the signs of three areas."""
+    """Return whether points lie inside a triangle, by the signs of three areas."""
     signs = []
     for (ax, ay), (bx, by) in zip(triangle, np.roll(triangle, -1, axis=0), strict=True):
         signs.append((bx - ax) * (y - ay) - (by - ay) * (x - ax))

@@ -60,7 +60,7 @@ class Views:
 
     @cached_property
     def _has_seam(self) -> bool:
-        """Whether pictures of a full turn are among those of the data set."""
+        """Return whether pictures of a full turn are among those of the data set."""
         rigs = (shot.rig for shot in self._dataset.shots_of_parts if shot is not None)
         return any(sensor.intrinsics.lens.period is not None for rig in rigs for sensor in rig.sensors)
 

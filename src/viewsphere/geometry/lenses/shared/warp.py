@@ -37,7 +37,7 @@ at most the third harmonic for the terms of lenses, so its true share is (3 pi /
 """
 
 FLAT = 1e-9
-"""The slope below which a map is taken for flat, beside a slope of 1 at the axis."""
+"""Least slope of a map that counts as rising, relative to a slope of 1 at the axis."""
 
 FARTHEST = math.tan(1.57)
 """The largest radius in the plane z = 1 that is examined: 89.95 degrees off the axis."""
@@ -105,7 +105,7 @@ def _limit(bend: Map, k: tuple[float, ...], farthest: float) -> float:
     cosine, sine = np.cos(turn), np.sin(turn)
 
     def is_one_to_one(r: Float) -> NDArray[np.bool_]:
-        """Whether the Jacobian's symmetric part is positive definite on circles of radius r (N,)."""
+        """Return whether the Jacobian's symmetric part is positive definite on circles of radius r (N,)."""
         at = bend(k, np.outer(r, cosine).ravel(), np.outer(r, sine).ravel())
         half, shear = (at.ux - at.vy) / 2, (at.uy + at.vx) / 2
         middle, spread = (at.ux + at.vy) / 2, np.sqrt(half * half + shear * shear)
