@@ -280,10 +280,16 @@ class Recipe(Shown, Frozen):
 
     @model_validator(mode="after")
     def _as_stored(self) -> Self:
-        """The recipe, with the picture that its kind of file holds; a picture that is listed itself stays beside `rgb`."""
-        deep = self.files.deep
-        if deep is not None and deep not in self.channels:
-            object.__setattr__(self, "channels", tuple(deep if name == "rgb" else name for name in self.channels))
+        """The recipe, with the distances that its lens has instead of default ones, and the picture that its kind of file
+        holds; a picture that is listed itself stays beside `rgb`.
+        """
+        instead = dict[str, str]()
+        if self.camera.lacks_depth and "channels" not in self.model_fields_set:
+            instead["depth"] = "depth_ray"
+        if self.files.deep is not None and self.files.deep not in self.channels:
+            instead["rgb"] = self.files.deep
+        if instead:  # beside `model_fields_set`, so that default channels stay default ones
+            object.__setattr__(self, "channels", tuple(instead.get(name, name) for name in self.channels))
         return self
 
     @field_validator("scene")
@@ -320,9 +326,6 @@ class Recipe(Shown, Frozen):
         """Store the folder of relative paths, and the file's lines."""
         self._folder = Path((context or {}).get("folder", Path.cwd())).absolute()
         self._marks = (context or {}).get("marks") or Marks()
-        if self.camera.lacks_depth and "channels" not in self.model_fields_set:
-            channels = tuple("depth_ray" if name == "depth" else name for name in self.channels)
-            object.__setattr__(self, "channels", channels)  # stays a default: not among the fields that were set
 
     @contextmanager
     def located(self) -> Generator[None]:

@@ -56,7 +56,12 @@ class Frozen(BaseModel):
         try:
             return handler(data)
         except ValidationError as error:
-            raise explained(error, tuple(cls.model_fields)) from None
+            raise explained(error, cls._known_names()) from None
+
+    @classmethod
+    def _known_names(cls) -> tuple[str, ...]:
+        """The names that errors about unknown fields list."""
+        return tuple(cls.model_fields)
 
     @classmethod
     def of_defaults(cls) -> Self:

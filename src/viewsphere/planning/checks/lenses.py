@@ -11,7 +11,6 @@ from viewsphere.labels import is_channel, label_named
 from viewsphere.model.channel import PASSES
 from viewsphere.model.sensors.rig import Rig
 from viewsphere.plugins.engine import EngineSpec
-from viewsphere.recipe.draws import alternatives, span
 from viewsphere.recipe.recipe import Recipe
 
 
@@ -53,16 +52,9 @@ def _of_pictures(recipe: Recipe, lens: str) -> Iterator[tuple[str, str]]:
             (f"expected one that paints parallel rays beside projection: {lens}; found {recipe.engine.name}: take raster"),
         )
     for where, scene in recipe.varied_scenes.items():
-        for name in ("rain", "snow"):
-            if any(value != "off" for value in alternatives(getattr(scene, name))):
-                yield (
-                    f"{where}.{name}",
-                    f"expected off beside projection: {lens}, whose rays begin far apart; found {name}",
-                )
+        for name in scene.precipitation:
+            yield f"{where}.{name}", f"expected off beside projection: {lens}, whose rays begin far apart; found {name}"
         for spec, strength in scene.effects.strengths:
-            if spec.needs_pinhole and any(span(strength)):
-                found = f"{max(span(strength), key=abs):g}"
-                yield (
-                    f"{where}.effects.{spec.name}",
-                    f"expected 0 beside projection: {lens}, as it is made for a pinhole; found {found}",
-                )
+            if spec.needs_pinhole:
+                reason = f"expected 0 beside projection: {lens}, as it is made for a pinhole; found {strength:g}"
+                yield f"{where}.effects.{spec.name}", reason

@@ -49,11 +49,10 @@ def _check_seam(where: str, scene: SceneEntry, sensor: Sensor) -> None:
 def _flat(scene: SceneEntry) -> Iterator[tuple[str, str]]:
     """The parts of a scene that end at the sides of the picture, with their values."""
     for spec, strength in scene.effects.strengths:
-        if spec.shows_seam and any(span(strength)):
-            yield f"effects.{spec.name}", f"{max(span(strength), key=abs):g}"
-    for name in ("rain", "snow"):
-        if any(value != "off" for value in alternatives(getattr(scene, name))):
-            yield name, "it"
+        if spec.shows_seam:
+            yield f"effects.{spec.name}", f"{strength:g}"
+    for name in scene.precipitation:
+        yield name, "it"
     if any(value != "none" for value in alternatives(scene.smoother.kind)):
         yield "smoother", "one"
     if any(entry.image is not None or entry.images is not None for entry in scene.backgrounds):

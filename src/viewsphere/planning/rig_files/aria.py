@@ -14,7 +14,7 @@ from viewsphere.composing.viewpoints.pose_files.motions import from_quaternion
 from viewsphere.errors import RecipeError
 from viewsphere.geometry.lenses import lens_parameters
 from viewsphere.geometry.rotation import rigid
-from viewsphere.planning.rig_files.documents import mapping, one_of, row, size
+from viewsphere.planning.rig_files.documents import listed, mapping, one_of, row, size
 from viewsphere.planning.rig_files.entries import Calibrated, camera_matrix, relative
 from viewsphere.validation.errors import shown, told_of
 
@@ -33,10 +33,7 @@ def sensors(documents: Mapping[Path, dict[str, Any]], rectified: bool) -> tuple[
     if rectified or len(documents) > 1:
         raise RecipeError(f"{where}: expected one file of Project Aria's, without rectified: true; found another setting")
     (document,) = documents.values()
-    cameras = document.get("CameraCalibrations")
-    if not isinstance(cameras, list) or not cameras:
-        raise RecipeError(f"{where}: CameraCalibrations: expected a list of cameras; found {shown(cameras)}")
-    entries = enumerate(cast("list[Any]", cameras))
+    entries = enumerate(listed(document.get("CameraCalibrations"), f"{where}: CameraCalibrations", "cameras"))
     return relative([_camera(mapping(e, f"{where}: CameraCalibrations[{i}]"), f"{where}: camera {i}") for i, e in entries])
 
 

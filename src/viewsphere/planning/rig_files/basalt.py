@@ -8,16 +8,16 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Any, NamedTuple, cast
+from typing import Any, NamedTuple
 
 from viewsphere.composing.viewpoints.pose_files.lines import number
 from viewsphere.composing.viewpoints.pose_files.motions import from_quaternion
 from viewsphere.errors import RecipeError
 from viewsphere.geometry.lenses import LensParameters, lens_parameters
 from viewsphere.geometry.rotation import rigid
-from viewsphere.planning.rig_files.documents import mapping, one_of, row, size
+from viewsphere.planning.rig_files.documents import listed, mapping, one_of, row, size
 from viewsphere.planning.rig_files.entries import Calibrated, brown_conrady, camera_matrix, fisheye, relative
-from viewsphere.validation.errors import shown, told_of
+from viewsphere.validation.errors import told_of
 
 MATRIX = ("fx", "fy", "cx", "cy")
 
@@ -61,17 +61,11 @@ def sensors(documents: Mapping[Path, dict[str, Any]], rectified: bool) -> tuple[
         raise RecipeError(f"{where}: expected one file of Basalt's, without rectified: true; found another setting")
     (document,) = documents.values()
     value = mapping(document.get("value0"), f"{where}: value0")
-    cameras = [_listed(value.get(name), f"{where}: {name}") for name in ("intrinsics", "T_imu_cam", "resolution")]
-    if not len(cameras[0]) or len({len(entries) for entries in cameras}) > 1:
+    cameras = [listed(value.get(name), f"{where}: {name}", "cameras") for name in ("intrinsics", "T_imu_cam", "resolution")]
+    if len({len(entries) for entries in cameras}) > 1:
         counts = ", ".join(str(len(entries)) for entries in cameras)
         raise RecipeError(f"{where}: expected equally many intrinsics, T_imu_cam and resolution; found {counts}")
     return relative([_camera(i, a, b, c, where) for i, (a, b, c) in enumerate(zip(*cameras, strict=True))])
-
-
-def _listed(value: Any, where: str) -> list[Any]:
-    if not isinstance(value, list):
-        raise RecipeError(f"{where}: expected a list; found {'nothing' if value is None else shown(value)}")
-    return cast("list[Any]", value)
 
 
 def _camera(i: int, lens: Any, pose: Any, extent: Any, where: str) -> Calibrated:

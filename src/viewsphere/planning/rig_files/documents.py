@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection
 from itertools import chain
 from pathlib import Path
 from typing import Any, cast
@@ -13,32 +13,20 @@ from numpy.typing import NDArray
 
 from viewsphere.composing.viewpoints.pose_files.lines import number, picture_size, read_text
 from viewsphere.errors import RecipeError
-from viewsphere.limits import limits
 from viewsphere.planning.rig_files.encoded import colmap_lines, xml_document
-from viewsphere.recipe.reading.file import ShallowLoader
+from viewsphere.recipe.reading.file import BoundedLoader
 from viewsphere.validation.errors import shown
 
 Float = NDArray[np.float64]
 
 
-class _Loader(ShallowLoader):
+class _Loader(BoundedLoader):
     """A loader of plain data; `!!opencv-matrix` becomes a mapping, and a vector in OpenCV 5's `!!opencv-nd-matrix` becomes one
     column. It ends before values that stand, by aliases, for more than the limit of a recipe.
     """
 
-    def __init__(self, text: str) -> None:
-        super().__init__(text)
-        self._left = self._most = limits.MAX_RECIPE_VALUES
-
-    def compose_node(self, parent: yaml.Node | None, index: Any) -> yaml.Node | None:
-        """The next node; raises ConstructorError for one beyond the limit, before the rest is read."""
-        self._left -= 1
-        if self._left < 0:
-            raise self._too_many(self.peek_event().start_mark)
-        return super().compose_node(parent, index)
-
     def get_single_node(self) -> yaml.Node | None:
-        """The document's node; raises ConstructorError for too many values, and for a value within itself."""
+        """The document's node; raises MarkedYAMLError for too many values, and for a value within itself."""
         root = super().get_single_node()
         if root is not None:
             self._count(root, {})
@@ -51,13 +39,9 @@ class _Loader(ShallowLoader):
             parts = node.value if isinstance(node, yaml.CollectionNode) else ()
             nodes = chain.from_iterable(parts) if isinstance(node, yaml.MappingNode) else parts
             counted[id(node)] = 1 + sum(self._count(part, counted) for part in nodes)
-        if not 0 < counted[id(node)] <= self._most:
-            raise self._too_many(node.start_mark)
+        if not 0 < counted[id(node)] <= self.most:
+            raise self.too_many(node.start_mark)
         return counted[id(node)]
-
-    def _too_many(self, mark: yaml.Mark) -> yaml.constructor.ConstructorError:
-        problem = f"at most {self._most:,} values (limit MAX_RECIPE_VALUES) were expected; found more: write fewer aliases"
-        return yaml.constructor.ConstructorError(problem=problem, problem_mark=mark)
 
 
 def _as_mapping(loader: yaml.SafeLoader, node: yaml.MappingNode) -> dict[Any, Any]:
@@ -150,9 +134,14 @@ def matrix(value: Any, where: str, shape: tuple[int, int] | None = None) -> Floa
 
 def row(value: Any, where: str) -> list[float]:
     """A list of finite numbers."""
+    return [number(cell, where) for cell in listed(value, where, "numbers")]
+
+
+def listed(value: Any, where: str, kind: str) -> list[Any]:
+    """A list of a document; raises RecipeError, which names the `kind` of its members, for any other value."""
     if not isinstance(value, list):
-        raise RecipeError(f"{where}: expected a list of numbers; found {_found(value)}")
-    return [number(cell, where) for cell in cast("Sequence[object]", value)]
+        raise RecipeError(f"{where}: expected a list of {kind}; found {_found(value)}")
+    return cast("list[Any]", value)
 
 
 def size(width: Any, height: Any, where: str) -> tuple[int, int] | None:

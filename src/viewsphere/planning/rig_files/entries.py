@@ -96,6 +96,8 @@ def inverse(turn: Float, shift: Float) -> Float:
 
 def relative(sensors: Sequence[Calibrated]) -> tuple[Calibrated, ...]:
     """The sensors with their poses in the first one's axes instead of common ones."""
+    if not sensors:
+        return ()
     first = sensors[0].rig_from_sensor
     back = inverse(first[:3, :3], first[:3, 3])
     others = (replace(sensor, rig_from_sensor=compose(back, sensor.rig_from_sensor)) for sensor in sensors[1:])

@@ -70,8 +70,18 @@ def _use_yaml_12(rules: type[yaml.SafeLoader] | type[yaml.SafeDumper]) -> None:
     rules.add_implicit_resolver(f"{_TAG}float", _FLOAT, list("-+.0123456789"))
 
 
-class ShallowLoader(yaml.SafeLoader):
-    """A loader that raises RecursionError for more than `DEEPEST` brackets within one another, before it reads on."""
+class _TooMany(yaml.MarkedYAMLError):
+    """More values than a recipe may have."""
+
+
+class BoundedLoader(yaml.SafeLoader):
+    """A loader that ends before it reads on: RecursionError for more than `DEEPEST` brackets within one another, and a
+    MarkedYAMLError at the first value beyond MAX_RECIPE_VALUES. Keys of mappings do not count as values.
+    """
+
+    def __init__(self, text: str) -> None:
+        super().__init__(text)
+        self.most = self._left = limits.MAX_RECIPE_VALUES
 
     def fetch_flow_collection_start(self, TokenClass: Any) -> None:
         """Begin a list or a mapping in brackets."""
@@ -79,26 +89,22 @@ class ShallowLoader(yaml.SafeLoader):
             raise RecursionError("lists or mappings nested too deeply")
         super().fetch_flow_collection_start(TokenClass)
 
-
-class _Loader(ShallowLoader):
-    """A loader that follows the rules of YAML 1.2, and ends at the first value beyond the limit, before the rest is read."""
-
-    def __init__(self, text: str) -> None:
-        super().__init__(text)
-        self.most = limits.MAX_RECIPE_VALUES
-        self._left = self.most
-
     def compose_node(self, parent: Node | None, index: Any) -> Node | None:
-        """The next node; raises _TooMany for a value beyond the limit. Keys of mappings do not count as values."""
+        """The next node."""
         if parent is None or index is not None:
             self._left -= 1
             if self._left < 0:
-                raise _TooMany(self.peek_event().start_mark.line + 1)
+                raise self.too_many(self.peek_event().start_mark)
         return super().compose_node(parent, cast(Any, index))
 
+    def too_many(self, mark: yaml.Mark) -> yaml.MarkedYAMLError:
+        """The error of a value beyond the limit at this place."""
+        problem = f"at most {self.most:,} values (limit MAX_RECIPE_VALUES) were expected; found more: write fewer aliases"
+        return _TooMany(problem=problem, problem_mark=mark)
 
-class _TooMany(Exception):
-    """More values than a recipe may have; the argument is the line of the first of them."""
+
+class _Loader(BoundedLoader):
+    """A loader that follows the rules of YAML 1.2."""
 
 
 class _Dumper(yaml.SafeDumper):
@@ -130,11 +136,12 @@ def parse(text: str, source: str) -> tuple[Any, Marks]:
         root = loader.get_single_node()
         reader = _Reader(source, loader.most)
         data = reader.value(root, ()) if root is not None else None
+    except _TooMany as error:
+        line = error.problem_mark.line + 1 if error.problem_mark else 1
+        problem = f"expected at most {loader.most:,} values (limit MAX_RECIPE_VALUES); found more"
+        raise RecipeError(f"{source}:{line}: {problem}: write fewer, or set VIEWSPHERE_MAX_RECIPE_VALUES higher") from None
     except yaml.MarkedYAMLError as error:
         raise RecipeError(f"{source}:{_syntax_error(text, error, _Loader)}") from None
-    except _TooMany as error:
-        problem = f"expected at most {loader.most:,} values (limit MAX_RECIPE_VALUES); found more"
-        raise RecipeError(f"{source}:{error}: {problem}: write fewer, or set VIEWSPHERE_MAX_RECIPE_VALUES higher") from None
     except RecursionError:
         raise RecipeError(f"{source}: expected a recipe, found lists or mappings nested too deeply") from None
     return data, Marks(source, {steps: Place(source, line) for steps, line in reader.lines.items()})

@@ -9,11 +9,8 @@ from typing import Any, ClassVar, Self, cast
 
 from pydantic import (
     GetJsonSchemaHandler,
-    ModelWrapValidatorHandler,
-    ValidationError,
     ValidationInfo,
     create_model,
-    model_validator,
 )
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema
@@ -23,9 +20,9 @@ from viewsphere.errors import PluginError
 from viewsphere.model.fields.frozen import Frozen
 from viewsphere.model.scene import SEED, Effects
 from viewsphere.plugins.effect import EffectSpec
+from viewsphere.recipe.draws import span
 from viewsphere.recipe.entries import entry_of
 from viewsphere.recipe.world.finish import PerFrame
-from viewsphere.validation.errors import explained
 
 ABOUT = "Camera effects; strengths are 0 (none) to 1 (the strongest useful effect)."
 
@@ -40,14 +37,15 @@ class EffectsEntry(PerFrame):
     specs: ClassVar[tuple[EffectSpec, ...]] = ()
 
     @property
-    def strengths(self) -> Iterator[tuple[EffectSpec, Any]]:
-        """The effects that can be on, with their strengths, which may be distributions."""
-        return ((spec, value) for spec in self.specs if (value := getattr(self, spec.name)))
+    def strengths(self) -> Iterator[tuple[EffectSpec, float]]:
+        """The effects that can be on, with the strength farthest from 0 that they may have."""
+        strongest = ((spec, max(span(getattr(self, spec.name)), key=abs)) for spec in self.specs)
+        return ((spec, strength) for spec, strength in strongest if strength)
 
     @property
     def is_noisy(self) -> bool:
         """True if the effects can include noise, which differs in every frame."""
-        return any(spec.is_noisy for spec, _ in self.strengths)
+        return any(spec.is_noisy and getattr(self, spec.name) for spec in self.specs)
 
     @property
     def effects(self) -> Effects:
@@ -69,14 +67,10 @@ class EffectsEntry(PerFrame):
         named = cast("Mapping[Any, Any]", value) if isinstance(value, Mapping) else {}
         return cast(Self, _entry_with(named).model_validate(value, context=info.context))
 
-    @model_validator(mode="wrap")
     @classmethod
-    def _explain(cls, data: Any, handler: ModelWrapValidatorHandler[Self]) -> Self:
-        """Read an entry; the nearest valid name of a misspelt effect may be one of a plug-in that is not loaded."""
-        try:
-            return handler(data)
-        except ValidationError as error:
-            raise explained(error, tuple(dict.fromkeys((*cls.model_fields, *plugins.names("effects"))))) from None
+    def _known_names(cls) -> tuple[str, ...]:
+        """The nearest name of a misspelt effect may be one of a plug-in that is not loaded."""
+        return tuple(dict.fromkeys((*super()._known_names(), *plugins.names("effects"))))
 
     @classmethod
     def __get_pydantic_json_schema__(cls, schema: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:

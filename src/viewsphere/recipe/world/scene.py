@@ -312,6 +312,11 @@ class SceneEntry(Frozen):
         return tuple(alternatives(self.background))
 
     @property
+    def precipitation(self) -> tuple[str, ...]:
+        """The fields of weather that may fall through the picture: rain, snow, both or none."""
+        return tuple(name for name in ("rain", "snow") if any(value != "off" for value in alternatives(getattr(self, name))))
+
+    @property
     def automatic_ground(self) -> Literal["on", "off", "catcher"]:
         """The ground that `ground: auto` selects in this scene."""
         if self.blend is not None:
