@@ -42,7 +42,7 @@ from viewsphere.labels.shared.captions.statements import (
 from viewsphere.labels.shared.drawing.lines import written
 from viewsphere.labels.shared.field import Field
 from viewsphere.labels.shared.ids import in_attributes
-from viewsphere.labels.shared.needs import Randomness, Scenery, ShotAppearance
+from viewsphere.labels.shared.needs import Randomness, Scenery, ShotAppearance, no_sides
 from viewsphere.labels.shared.randomness import generator
 from viewsphere.labels.shared.spec import Drawing, Models, Picture, SampleLabel
 from viewsphere.model.annotations.classes import SKY, STUFF_IDS
@@ -338,7 +338,7 @@ def _beside(sample: Sample) -> Picture:
 
 LABEL = SampleLabel(
     name="captions",
-    panoramas=False,
+    refuses=no_sides,
     meaning="sentences about the picture",
     needs=(Randomness(), ShotAppearance()),
     options=_Captions,

@@ -15,6 +15,7 @@ from viewsphere.model.sample import Sample
 
 if TYPE_CHECKING:
     from viewsphere.labels.shared.context import LabelContext
+    from viewsphere.model.sensors.camera import Intrinsics
 
 
 def _along_axis(context: LabelContext) -> NDArray[np.float32]:
@@ -60,6 +61,13 @@ def _prove_depth_ray(sample: Sample, models: Models) -> Iterator[str]:
         yield "expected finite distances where depth is finite, and nowhere else; found others"
 
 
+def _no_depth(intrinsics: Intrinsics) -> str | None:
+    """The reason why pictures of this lens have no z-depth; None if they have."""
+    if intrinsics.lens.has_depth:
+        return None
+    return f"expected a lens with z-depth; found {intrinsics.lens.name}: use depth_ray, or leave it out"
+
+
 def _label(name: str, compute: Callable[[LabelContext], Array], meaning: str, prove: Proof) -> ChannelLabel:
     """A channel of distances."""
     return ChannelLabel(
@@ -70,7 +78,7 @@ def _label(name: str, compute: Callable[[LabelContext], Array], meaning: str, pr
         unit="m",
         empty=np.inf,
         in_steps=name == "depth",
-        panoramas=name != "depth",
+        refuses=_no_depth if name == "depth" else None,
         compute=compute,
         prove=prove,
         drawing=Drawing(

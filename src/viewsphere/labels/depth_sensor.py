@@ -86,11 +86,9 @@ def _compute(context: LabelContext) -> NDArray[np.float32]:
 
 def _refuses(intrinsics: Intrinsics) -> str | None:
     """The reason why no range camera has this lens; None if one may."""
-    if not intrinsics.lens.is_parallel:
+    if intrinsics.lens.has_depth and not intrinsics.lens.is_parallel:
         return None
-    return (
-        f"expected a lens whose rays pass through one centre, as range cameras have; found {intrinsics.lens.name}: leave it out"
-    )
+    return f"expected a lens with z-depth and one centre, as range cameras have; found {intrinsics.lens.name}: leave it out"
 
 
 def _seen(context: LabelContext) -> tuple[Float, Float]:
@@ -175,7 +173,6 @@ def _beside(sample: Sample) -> Picture:
 
 LABEL = ChannelLabel(
     name="depth_sensor",
-    panoramas=False,
     meaning="depth as a depth camera measures it, with noise, steps and holes",
     axes="camera",
     needs=(Randomness(),),

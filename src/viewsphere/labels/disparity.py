@@ -60,7 +60,6 @@ def _picture(disparity: NDArray[np.float32], within: Extent | None = None) -> Pi
 
 LABEL = ChannelLabel(
     name="disparity",
-    panoramas=False,
     meaning="x in the left picture less x in the right one, of the rectified pair",
     axes="image",
     needs=(Partner(),),

@@ -58,7 +58,6 @@ def _picture(change: NDArray[np.float32], within: Extent | None = None) -> Pictu
 
 LABEL = ChannelLabel(
     name="disparity_change",
-    panoramas=False,
     meaning="the seen point's disparity one instant later, less its disparity",
     axes="image",
     needs=(Next(), Partner()),

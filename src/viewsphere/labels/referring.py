@@ -28,7 +28,7 @@ from viewsphere.labels.shared.drawing.colors import color_of
 from viewsphere.labels.shared.drawing.lines import note
 from viewsphere.labels.shared.field import Field
 from viewsphere.labels.shared.ids import in_attributes
-from viewsphere.labels.shared.needs import ShotAppearance
+from viewsphere.labels.shared.needs import ShotAppearance, no_sides
 from viewsphere.labels.shared.spec import Drawing, Models, SampleLabel
 from viewsphere.model.fields.frozen import Frozen
 from viewsphere.model.fields.numbers import Portion
@@ -250,7 +250,7 @@ def _draw(pen: ImageDraw, sample: Sample, scale: float) -> None:
 
 LABEL = SampleLabel(
     name="referring",
-    panoramas=False,
+    refuses=no_sides,
     meaning="expressions that single objects out",
     needs=(ShotAppearance(),),
     options=_Referring,

@@ -43,7 +43,6 @@ from viewsphere.planning.checks.models import (
     check_sizes,
     check_specs,
 )
-from viewsphere.planning.checks.panoramas import check_panoramas
 from viewsphere.planning.checks.sequences import check_sequences
 from viewsphere.planning.checks.warnings import doubtful_views, unlit
 from viewsphere.planning.clips import with_clips
@@ -437,8 +436,8 @@ def plan(recipe: Recipe | str | PathLike[str], shot_frames: int | None = None) -
         views = poses_of(recipe.viewpoints, recipe.time, recipe.seed, recipe.folder)
         own = lens(recipe, views)
         rig = rig_of(recipe, own)
-        check_panoramas(recipe, rig or Rig.single(own))
-        check_lenses(recipe, rig or Rig.single(own))
+        if rig is None:  # those of a rig are checked together with it
+            check_lenses(recipe, Rig.single(own))
         check_fill(recipe, rig or Rig.single(own), views)
         check_frames(recipe, views)
         found = numbered_specs(recipe)

@@ -147,5 +147,7 @@ def test_distances_along_rays_replace_depth_among_the_default_channels():
     assert recipe.channels == ("rgb", "depth_ray", "instances", "normals")
     assert Recipe.model_validate(recipe.model_dump(mode="json", exclude_defaults=True)).digest == recipe.digest
     assert plan(recipe).frames == 1
-    with pytest.raises(RecipeError, match="found depth of the equirectangular camera: use depth_ray"):
+    with pytest.raises(
+        RecipeError, match="channels: depth: expected a lens with z-depth; found equirectangular: use depth_ray"
+    ):
         plan(Recipe.model_validate({**recipe.model_dump(mode="json"), "channels": ["rgb", "depth"]}))

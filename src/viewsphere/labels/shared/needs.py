@@ -237,9 +237,18 @@ def requires(needs: tuple[Need[Any], ...], kind: type[Need[Any]]) -> bool:
 
 def no_disparity(intrinsics: Intrinsics) -> str | None:
     """The reason why pictures of this lens have no disparity; None if they have."""
+    if not intrinsics.lens.has_depth:
+        return f"expected a lens with z-depth, from which disparity follows; found {intrinsics.lens.name}: leave it out"
     if not intrinsics.lens.is_parallel:
         return None
     return (
         f"expected a lens whose rays pass through one centre; found {intrinsics.lens.name}, whose disparity is constant, "
         f"baseline x {intrinsics.fx:g} pixels a metre: leave it out"
     )
+
+
+def no_sides(intrinsics: Intrinsics) -> str | None:
+    """The reason why words for left and right do not fit pictures of this lens; None if they do."""
+    if intrinsics.lens.has_depth:
+        return None
+    return f"expected a lens whose pictures have a left and a right; found {intrinsics.lens.name}: leave it out"

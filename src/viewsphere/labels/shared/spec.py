@@ -110,10 +110,6 @@ class LabelSpec(Spec):
         description="`refuses(intrinsics)`: the reason why pictures of this lens cannot have the label, None if they can",
     )
     drawing: InstanceOf[Drawing] | None = described(default=None, description="the `Drawing` of previews and reports")
-    panoramas: bool = described(
-        default=True,
-        description="whether it is defined in panoramas; False for labels of z-depth, and of left and right in the picture",
-    )
     names_categories: bool = described(
         default=False,
         description="whether its text contains names of categories, which merging must then not change",
