@@ -21,7 +21,7 @@ CORE = "viewsphere"
 LIMITS = {
     "folders with more than 15 files": (0, 0),
     "modules under 60 lines with one importer": (0, 0),
-    "public functions and classes of the core": (2596, 2400),
+    "public functions and classes of the core": (2451, 2400),
     "modules in import cycles": (0, 0),
     "imports of a higher layer": (0, 0),
     "functions over 60 lines": (0, 0),
@@ -125,9 +125,9 @@ def small_modules(found: dict[str, Module], imports: Imports) -> Iterator[str]:
 
 
 def public_names(found: dict[str, Module]) -> Iterator[str]:
-    """The public names of the core's modules."""
+    """The public names of the core's modules, other than plug-ins: one more of those is one more file, no new API."""
     for name, module in found.items():
-        if name.split(".")[0] == CORE:
+        if name.split(".")[0] == CORE and not module.is_plugin:
             yield from (f"{name}.{public}" for public in sorted(module.public()))
 
 
