@@ -25,6 +25,10 @@ LENSES = {
     },
     "fisheye": {"size": [80, 80], "fov_deg": 90, "distortion": {"model": "fisheye", "coefficients": [0.02, -0.004, 0, 0]}},
 }
+PANORAMAS = {
+    "equirectangular": {"size": [128, 64], "projection": "equirectangular"},
+    "cylindrical": {"size": [96, 96], "projection": "cylindrical", "span": {"horizontal": 80}},
+}
 VIEWPOINTS = {
     "grid": {"azimuth": [0, 77], "elevation": [-20, 65], "distance": {"fill": [0.85, 0.25]}, "tilt": 11},
     "steps": {"azimuth": 30, "elevation": 0, "distance": {"fill": {"start": 0.25, "stop": 0.85, "step": 0.2}}},
@@ -66,6 +70,13 @@ def test_the_labels_box_fills_the_share_that_was_asked_for(lens):
         assert label_fill(sample) == pytest.approx(sample.pose.fill, rel=1e-8)  # of what the recorded camera projects
         stands = np.linalg.norm(sample.camera.center - np.array(sample.pose.target or (0, 0, 0)))
         assert stands == pytest.approx(sample.pose.distance, rel=1e-9)
+
+
+@pytest.mark.parametrize("lens", PANORAMAS)
+def test_the_box_in_a_panorama_fills_the_share_too(lens):
+    views = {"azimuth": [0, 50], "distance": {"fill": [0.5, 0.1]}}
+    samples = list(vs.render(recipe_of(("zoo:chair",), camera=PANORAMAS[lens], viewpoints=views)))
+    assert [label_fill(sample) for sample in samples] == pytest.approx([0.5, 0.5, 0.1, 0.1], rel=1e-8)
 
 
 @pytest.mark.parametrize("kind", VIEWPOINTS)

@@ -10,7 +10,7 @@ import pytest
 from cube_dataset import make
 from small import small_recipe
 from truth_scenes import PARALLEL
-from viewsphere import Dataset, Recipe, generate, plan, plugins
+from viewsphere import Dataset, Recipe, generate, plan, plugins, render
 from viewsphere.check import check
 from viewsphere.errors import RecipeError, UserError
 from viewsphere.geometry.lenses.orthographic import NARROWEST
@@ -23,6 +23,7 @@ from viewsphere.run.exports.scope import not_held, refuse, scope_of
 from viewsphere.run.reports.rig_view import recipe_rig, rig_lines, rig_mesh
 
 CAMERA = {"size": [96, 72], "projection": "orthographic", "width_m": 0.32}
+STEREO = {"kind": "stereo", "baseline": 0.1}
 CHANNELS = [
     "rgb", "depth", "depth_ray", "instances", "normals", "position", "barycentrics", "coordinates", "nocs", "voxels",
 ]  # fmt: skip
@@ -49,7 +50,6 @@ def test_its_width_gives_square_pixels_and_is_written_as_it_was_given():
         ({"width_m": 1e-300}, "camera.width_m: expected a number greater than or equal to 0.000001; found 1e-300"),
         ({"width_m": float("nan")}, "camera.width_m: expected a finite number; found nan"),
         ({"width_m": float("inf")}, "camera.width_m: expected a finite number; found inf"),
-        ({"width_m": None}, "camera.width_m: "),
         ({"fov_deg": 30}, "camera.fov_deg: expected none beside projection: orthographic"),
         ({"distortion": {"model": "fisheye", "coefficients": [0, 0, 0, 0]}}, "camera.distortion: expected none beside proj"),
     ],
@@ -63,11 +63,6 @@ def test_a_wrong_camera_is_one_line(camera, told):
 @pytest.mark.parametrize(
     "camera, told",
     [
-        (
-            {"projection": "orthographic"},
-            "camera: expected width_m beside projection: orthographic; found nothing: set the width in metres that the picture "
-            "spans, at any distance",
-        ),
         (
             {"projection": "orthographic", "width_n": 2},
             "camera.width_n: 'width_n' is unknown; did you mean 'width_m'? Valid: projection, width_m, size",
@@ -85,13 +80,68 @@ def test_an_option_without_its_lens_and_a_lens_without_its_option_are_told(camer
     assert str(error.value) == told
 
 
+OPEN = {"size": [96, 72], "projection": "orthographic"}
+FILLED = {"azimuth": [0, 50], "elevation": 20, "distance": {"fill": [0.8, 0.2]}}
+
+
+@pytest.mark.parametrize(
+    "changes, told",
+    [
+        ({"camera": OPEN}, "camera: expected width_m beside projection: orthographic, the width .* or distance: {fill: ...}"),
+        ({"viewpoints": FILLED}, "viewpoints.distance: expected metres beside the width_m of projection: .* leave one of them"),
+        (
+            {"camera": {"size": [96, 72], "fov_deg": 40}, "rig": {"sensors": {"a": {}, "b": {"projection": "orthographic"}}}},
+            "rig.sensors.b: expected width_m beside projection: orthographic, .* found none: set it$",
+        ),
+    ],
+)
+def test_a_picture_has_one_width(changes, told):
+    with pytest.raises(RecipeError, match=told):
+        plan(parallel_recipe(channels=["rgb"], **changes))
+
+
+def test_a_filled_share_sets_the_width_of_each_picture_and_the_distance_places_the_camera():
+    """A box of 0.2 x 0.2 x 0.1 m, seen along an axis, is 0.2 / share metres of the picture wide."""
+    views = {"azimuth": 0, "elevation": 0, "distance": {"fill": [0.8, 0.2]}}
+    recipe = parallel_recipe(camera=OPEN, viewpoints=views, channels=["instances"])
+    samples = list(render(recipe))
+    for sample in samples:
+        (x0, y0, x1, y1), lens = sample.objects[0].box2d_unclipped, sample.camera.intrinsics
+        assert max((x1 - x0) / 96, (y1 - y0) / 72) == pytest.approx(sample.pose.fill, rel=1e-9)
+        box = np.array(sample.objects[0].box3d)
+        width, height = np.ptp(box @ sample.camera.R[0]), np.ptp(box @ sample.camera.R[1])
+        assert lens.fx == lens.fy == pytest.approx(sample.pose.fill / max(width / 96, height / 72), rel=1e-6)
+        away = np.linalg.norm(sample.camera.center - np.array(sample.pose.target or sample.objects[0].box3d.mean(axis=0)))
+        assert away == pytest.approx(sample.pose.distance, rel=1e-6)
+        assert np.ptp(box, axis=0).max() < sample.pose.distance < 30 * np.ptp(box, axis=0).max()
+    assert samples[0].camera.intrinsics.fx == pytest.approx(4 * samples[1].camera.intrinsics.fx)
+
+
+def test_the_distance_s_jitter_moves_the_camera_alone():
+    recipe = parallel_recipe(camera=OPEN, viewpoints={**FILLED, "azimuth": 0}, channels=["instances"])
+    far = parallel_recipe(
+        camera=OPEN, viewpoints={**FILLED, "azimuth": 0}, channels=["instances"], scene={"jitter": {"distance": 0.5}}
+    )
+    for near, away in zip(render(recipe), render(far), strict=True):
+        assert away.camera.intrinsics == near.camera.intrinsics
+        assert away.pose.distance == pytest.approx(1.5 * near.pose.distance)
+
+
+def test_both_cameras_of_a_rig_have_the_width_of_the_first_and_check_proves_the_set(tmp_path):
+    recipe = parallel_recipe(
+        camera=OPEN, viewpoints=FILLED, rig=STEREO, channels=["rgb", "depth", "instances", "normals"], formats=["native"]
+    )
+    generate(recipe, tmp_path / "out", workers=0)
+    dataset = Dataset(tmp_path / "out")
+    assert not check(dataset).findings
+    assert dataset[0].camera.intrinsics == dataset[1].camera.intrinsics
+    assert len({sample.camera.intrinsics.fx for sample in dataset}) > 2
+
+
 @pytest.mark.slow
 def test_the_smallest_width_gives_a_data_set_that_passes_check(tmp_path):
     generate(parallel_recipe(camera={**CAMERA, "width_m": NARROWEST}, formats=[]), tmp_path / "out", workers=0)
     assert not check(Dataset(tmp_path / "out")).findings
-
-
-STEREO = {"kind": "stereo", "baseline": 0.1}
 
 
 @pytest.mark.parametrize(

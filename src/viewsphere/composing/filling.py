@@ -1,11 +1,13 @@
-"""Cameras whose distance follows from the filled share of the picture, measured on the projected models as in labels."""
+"""Cameras whose distance, or width for parallel rays, follows from the filled share of the picture, measured on the projected
+models as in labels.
+"""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import lru_cache, reduce
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +16,7 @@ from viewsphere.composing.viewpoints.camera import looking
 from viewsphere.errors import RecipeError
 from viewsphere.geometry.box import projected_bounds
 from viewsphere.geometry.rotation import transform
+from viewsphere.geometry.seam import united
 from viewsphere.model.instant import Instant, Viewpoint
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.sensors.camera import Camera
@@ -33,6 +36,12 @@ share.
 
 NEAREST = 1e9
 """The least distance of the search is the model's length divided by this number."""
+
+
+BEYOND = 4.0
+"""Distance of cameras with parallel rays, times the larger of the models' reach and half the picture's diagonal: from elevations
+above 14 degrees, all rays then begin above the ground.
+"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,7 +67,8 @@ def shape_of(shown: tuple[ModelSpec, TimeStep | None]) -> _Shape:
 
 def filled(shot: Shot, together: bool) -> Shot:
     """The shot with cameras at distances that fill the requested share of the picture of the rig's first sensor, with the
-    frame's model or with all targets `together`. A viewpoint's own distance is then a factor.
+    frame's model or with all targets `together`. A viewpoint's own distance is then a factor. Where rays are parallel, pictures
+    get a width that fills the share instead, and the camera is far enough to show the whole models.
 
     Raises RecipeError if no distance fills the share.
     """
@@ -75,18 +85,35 @@ def _filled(shot: Shot, i: int, together: bool) -> Instant:
     if view is None or view.fill is None or not targets:
         return now
     placed = [_placed(thing) for thing in targets]
+    reach = _reach(placed, now)
+    if shot.camera(i).lens.is_parallel:
+        return _widened(shot.model_copy(update={"instants": (_moved(now, view, BEYOND * reach),)}), view, placed, reach)
 
     def fill_at(distance: float) -> float:
         at = _moved(now, view, distance)
         return _share_filled(shot.model_copy(update={"instants": (at,)}).camera(0), placed)
 
-    distance = distance_of(view.fill, fill_at, _reach(placed, now))
+    distance = distance_of(view.fill, fill_at, reach)
     if distance is None:
         raise RecipeError(
             f"viewpoints.distance: expected a share of the picture that {targets[0].key} fills from some distance; found "
             f"{view.fill:g} (pose {view.index}): look at the model (target: center), or ask for another share"
         )
     return _moved(now, view, distance * view.distance)
+
+
+def _widened(seen: Shot, view: Viewpoint, placed: Sequence[_Shape], reach: float) -> Instant:
+    """The instant of a shot with parallel rays at the scale that fills the viewpoint's share; shares are proportional to the
+    scale. The camera of the shot shows the whole models.
+    """
+    camera = seen.camera(0)
+    lens = camera.intrinsics
+    assert view.fill is not None
+    factor = view.fill / _share_filled(camera, placed)
+    fx, fy, skew = (float(f"{factor * value:.12g}") for value in (lens.fx, lens.fy, lens.skew))
+    half_diagonal = math.hypot(lens.width / fx, lens.height / fy) / 2
+    there = _moved(seen.instants[0], view, BEYOND * max(reach, half_diagonal) * view.distance)
+    return there.model_copy(update={"intrinsics": lens.model_copy(update={"fx": fx, "fy": fy, "skew": skew})})
 
 
 def _moved(now: Instant, view: Viewpoint, distance: float) -> Instant:
@@ -113,9 +140,8 @@ def _share_filled(camera: Camera, placed: Sequence[_Shape]) -> float:
     boxes = [projected_bounds(camera, s.vertices, s.triangles, s.is_used) for s in placed]
     if not all(whole and bounds for bounds, whole in boxes):
         return math.inf
-    corners = np.array([bounds for bounds, _ in boxes])
-    width, height = (corners[:, 2:].max(axis=0) - corners[:, :2].min(axis=0)).tolist()
-    return max(width / camera.width, height / camera.height)
+    x0, y0, x1, y1 = reduce(lambda a, b: united(a, b, camera.lens.period), (bounds for bounds, _ in boxes if bounds))
+    return max((x1 - x0) / camera.width, (y1 - y0) / camera.height)
 
 
 def distance_of(fill: float, fill_at: Callable[[float], float], reach: float) -> float | None:

@@ -75,6 +75,11 @@ class LensOptions(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False, d
         """Return whether z-depth is defined."""
         return _spec(self.projection).has_depth
 
+    @property
+    def is_open(self) -> bool:
+        """Return whether the scale of pictures is not set, so that it follows from the viewpoints' `distance: {fill: ...}`."""
+        return False
+
     def calibration(self, size: tuple[int, int]) -> Calibration:
         """K and the parameters of the lens for a picture of this size (width, height)."""
         calibrate = _spec(self.projection).calibrate

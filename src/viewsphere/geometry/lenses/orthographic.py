@@ -5,7 +5,7 @@ K maps x and y in camera axes, metres, to pixels: fx and fy are pixels a metre.
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Annotated, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,12 +34,21 @@ class OrthographicOptions(LensOptions, frozen=True):
     """The width of the picture in the scene."""
 
     projection: Literal["orthographic"] = "orthographic"
-    width_m: float = Field(ge=NARROWEST, le=WIDEST, description="the width in metres that the picture spans, at any distance")
+    width_m: Annotated[float, Field(ge=NARROWEST, le=WIDEST)] | None = Field(
+        default=None,
+        description="the width in metres that the picture spans, at any distance; required unless viewpoints have distance: "
+        "{fill: ...}, which sets it for each frame",
+    )
+
+    @property
+    def is_open(self) -> bool:
+        """Return whether the width is not set."""
+        return self.width_m is None
 
 
 def _calibrate(options: OrthographicOptions, size: tuple[int, int]) -> Calibration:
-    """Square pixels, and the axis in the middle of the picture."""
-    scale = size[0] / options.width_m
+    """Square pixels, and the axis in the middle of the picture; 1 m wide until viewpoints set the width."""
+    scale = size[0] / (options.width_m or 1.0)
     return Calibration(scale, scale, size[0] / 2, size[1] / 2, Orthographic())
 
 

@@ -7,10 +7,13 @@ from collections.abc import Iterator
 from viewsphere import plugins
 from viewsphere.composing.viewpoints.poses import Poses
 from viewsphere.errors import RecipeError
+from viewsphere.geometry.lenses import LensOptions
 from viewsphere.labels import is_channel, label_named
 from viewsphere.model.channel import PASSES
+from viewsphere.model.sensors.camera import Intrinsics
 from viewsphere.model.sensors.rig import Rig
 from viewsphere.plugins.engine import EngineSpec
+from viewsphere.recipe.cameras.rig import SensorList
 from viewsphere.recipe.draws import alternatives, span
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.recipe.world.scene import SceneEntry
@@ -23,13 +26,32 @@ def check_lenses(recipe: Recipe, rig: Rig) -> None:
 
 
 def check_fill(recipe: Recipe, rig: Rig, views: Poses) -> None:
-    """Check that no viewpoint asks for a filled share of the picture, where a picture's width does not follow from distance."""
-    lens = rig.sensors[0].intrinsics.lens
-    if lens.is_parallel and any(views.fill(i) is not None for i in range(min(len(views), 1))):
-        raise RecipeError(
-            f"viewpoints.distance: expected metres beside projection: {lens.name}, whose pictures show as much from any "
-            "distance; found fill: set camera.width_m to the width that the picture spans"
-        )
+    """Check that each lens with parallel rays has one width: its own, or the one that viewpoints' filled share sets."""
+    is_filled = len(views) > 0 and views.fill(0) is not None
+    first = rig.sensors[0].intrinsics
+    for where, options, own in _projections(recipe, rig):
+        if options.is_open and not (is_filled and own == first):
+            fix = "set it, or distance: {fill: ...}" if own == first else "set it"
+            raise RecipeError(
+                f"{where}: expected width_m beside projection: {options.projection}, the width in metres that the picture "
+                f"spans; found none: {fix}"
+            )
+        if is_filled and own == first and own.lens.is_parallel and not options.is_open:
+            raise RecipeError(
+                f"viewpoints.distance: expected metres beside the width_m of projection: {options.projection}, as fill sets "
+                "the width of each picture; found fill: leave one of them out"
+            )
+
+
+def _projections(recipe: Recipe, rig: Rig) -> Iterator[tuple[str, LensOptions, Intrinsics]]:
+    """The lenses that a recipe names by `projection`: their fields, options and intrinsics."""
+    entries = recipe.rig.sensors if isinstance(recipe.rig, SensorList) else {}
+    for sensor in rig.sensors:
+        entry = entries.get(sensor.name)
+        if entry is not None and entry.projection is not None:
+            yield f"rig.sensors.{sensor.name}", entry.projection, sensor.intrinsics
+        elif recipe.camera.projection is not None and sensor.intrinsics.distortion == recipe.camera.intrinsics.distortion:
+            yield "camera", recipe.camera.projection, sensor.intrinsics
 
 
 def _limits(recipe: Recipe, rig: Rig) -> Iterator[tuple[str, str]]:
