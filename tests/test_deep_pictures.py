@@ -246,6 +246,7 @@ def test_formats_refuse_before_anything_is_rendered(tmp_path):
 
 
 @pytest.mark.parametrize("kind", ["png16", "exr", "hdr"])
+@pytest.mark.slow
 def test_formats_that_hold_deep_pictures_give_them_back(kind, tmp_path):
     h5py = pytest.importorskip("h5py")
     formats = ["native", "webdataset", "hdf5"] + [{"nerfstudio": {"kind": "instant-ngp"}}] * (kind != "png16")

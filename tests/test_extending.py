@@ -647,6 +647,7 @@ LACKING = "from viewsphere.errors import MissingExtraError\nraise MissingExtraEr
 @pytest.mark.parametrize(
     ("source", "error"), [("import no_such_package", "ModuleNotFoundError"), (LACKING, "MissingExtraError: broken needs foo")]
 )
+@pytest.mark.slow
 def test_a_broken_package_is_listed_with_its_reason_and_breaks_nothing_else(small_dataset, tmp_path, source, error):
     with installed(tmp_path / "site", "formats", "broken", source) as file:
         (found,) = (one for one in overview() if one.error is not None)
@@ -805,6 +806,7 @@ EFFECT = EffectSpec(name="glow", options=Glow, strongest="all light", stage="len
         ({"glow_inside": {"choice": [True, False]}}, lambda value: type(value) is bool),
     ],
 )
+@pytest.mark.slow
 def test_an_effect_s_options_of_all_types_are_given_and_drawn(install, tmp_path, given, allowed):
     install("effects", "glow", GLOW)
     recipe = small_recipe(scene={"effects": {"glow": 0.5, **given}}, channels=["rgb"], formats=[], viewpoints={"distance": 1})
@@ -878,6 +880,7 @@ def test_several_effects_are_one_file_and_one_step(install):
         ("hot_pixels_level", "seed", r"EffectSpec\.options: seed: expected another name than draw and seed"),
     ],
 )
+@pytest.mark.slow
 def test_a_faulty_effect_is_refused_where_it_is_named_and_nowhere_else(install, old, new, message):
     file = install("effects", "hot_pixels", EXAMPLES["hot_pixels"].replace(old, new))
     with pytest.raises(PluginError, match=f"^{re.escape(str(file))}: {message}"):
@@ -944,6 +947,7 @@ def test_a_reader_is_one_file(tri, tmp_path):
     assert (report.format, report.triangles, report.up) == ("tri", 4, "+z")
 
 
+@pytest.mark.slow
 def test_a_reader_of_a_third_party_has_the_sandbox_s_limits(tri, install, monkeypatch, tmp_path):
     with pytest.raises(ModelError, match=r"text\.tri: expected nine numbers a line; found something else$"):
         describe(tri("text.tri", "one two"))
@@ -985,6 +989,7 @@ def test_any_material_is_one_that_is_shipped(tmp_path):
         assert Recipe(**fields).digest == alone.digest
 
 
+@pytest.mark.slow
 def test_viewsphere_plugins_names_distributions_and_failures(tmp_path):
     site = tmp_path / "site"
     write_package(site, "my_package", {("formats", "lines"): EXAMPLES["One JSON line a picture"], ("motions", "odd"): "1 / 0"})

@@ -44,6 +44,7 @@ def tampered_lines(text):
 
 
 @pytest.mark.parametrize("suffix", quick([".obj", ".mtl"], ".mtl"))
+@pytest.mark.slow
 def test_every_word_of_a_text_is_compared_with_the_glb(textured, suffix):
     dataset = Dataset(textured)
     file = next((textured / "store" / "models").glob(f"*/*{suffix}"))

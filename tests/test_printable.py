@@ -62,6 +62,7 @@ def test_one_function_prints():
 
 @pytest.mark.skipif(not FULL.exists(), reason="Linux")
 @pytest.mark.parametrize("words", [("schema",), ("--version",)])
+@pytest.mark.slow
 def test_a_full_output_is_one_line_and_status_2(words):
     with FULL.open("wb") as full:
         done = subprocess.run(
@@ -73,6 +74,7 @@ def test_a_full_output_is_one_line_and_status_2(words):
     )
 
 
+@pytest.mark.slow
 def test_a_reader_that_has_ended_is_no_error():
     process = subprocess.Popen(
         [sys.executable, "-m", "viewsphere", "schema"], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True

@@ -59,6 +59,7 @@ def test_an_exr_environment_names_its_extra(tmp_path):
     assert said == f"{expected}: pip install 'viewsphere[exr]', or take an HDR"
 
 
+@pytest.mark.slow
 def test_stable_poses_and_rays_name_their_extras(tmp_path):
     stable, rays = said_without(
         """

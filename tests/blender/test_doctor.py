@@ -88,6 +88,7 @@ def test_a_cache_that_cannot_be_written(tmp_path, monkeypatch):
     assert "set VIEWSPHERE_CACHE" in doctor().stdout
 
 
+@pytest.mark.slow
 def test_speed_is_measured_in_a_second_once_kernels_are_there(monkeypatch):
     from viewsphere.run.estimate import REFERENCE_MS, measure_speed, speed_recipe
     from viewsphere.run.shots import precompile as warm

@@ -79,6 +79,7 @@ def test_an_error_leaves_it_alive(python):
 
 
 @pytest.mark.parametrize("how", ["SIGKILL", "SIGSEGV"])
+@pytest.mark.slow
 def test_death_is_told_and_another_can_be_started(python, how, tmp_path):
     log = tmp_path / "log"
     log.write_text("of another process\n")

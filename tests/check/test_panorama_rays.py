@@ -40,6 +40,7 @@ def off_surface(dataset):
 
 
 @pytest.mark.parametrize("lens", ["equirectangular", "cylindrical"])
+@pytest.mark.slow
 def test_a_changed_distance_of_a_panorama_is_found(tmp_path, lens):
     dataset = rendered(tmp_path / "out", lens, channels=["rgb", "depth_ray", "instances"])
     assert not off_surface(dataset)

@@ -141,6 +141,7 @@ def test_the_distance_does_not_depend_on_how_shots_are_cut():
     assert [s.pose for s in whole] == [s.pose for s in cut]
 
 
+@pytest.mark.slow
 def test_check_proves_a_set_of_shares_and_its_records_name_them(tmp_path):
     recipe = small_recipe(viewpoints={"azimuth": [0, 120], "elevation": 15, "distance": {"fill": [0.3, 0.6]}})
     vs.generate(recipe, tmp_path / "out", formats=["coco"])

@@ -190,6 +190,7 @@ def test_a_map_leaves_out_crowded_spots_alone(measures, own, gap, of_hulls, seed
 
 @pytest.mark.parametrize("floor", [None, Footprint(np.array([1.0, 2.0]), np.eye(2), np.array([17.3, 17.3]))])
 @pytest.mark.parametrize("between", ["boxes", "hulls"])
+@pytest.mark.slow
 def test_many_things_are_compared_with_few(floor, between, monkeypatch):
     compared = []
     for kind in (Footprint, Outline):

@@ -37,6 +37,7 @@ def spots(shots, category):
     return np.array([(pose[0, 3], pose[1, 3], pose[0, 1], pose[1, 1]) for pose in poses])  # and the way of their rear, +Y
 
 
+@pytest.mark.slow
 def test_cars_drive_on_the_right_and_walkers_are_on_the_pavement():
     shots = shots_of(parked=0)
     cars, walkers = spots(shots, "car"), spots(shots, "person")
@@ -48,6 +49,7 @@ def test_cars_drive_on_the_right_and_walkers_are_on_the_pavement():
     assert np.ptp(cars[:, 1]) > 8
 
 
+@pytest.mark.slow
 def test_parked_cars_stand_beside_the_lane():
     driving, parked = (spots(shots_of(parked=share, bay=2.0), "car") for share in (0, 1))
     assert np.abs(parked[:, 0]).min() > np.abs(driving[:, 0]).max()

@@ -125,6 +125,7 @@ def test_the_sphere_is_uniform_by_area():
     assert np.abs(points.T @ points / 4000 - np.eye(3) / 3).max() < 0.025
 
 
+@pytest.mark.slow
 def test_a_band_of_the_sphere_keeps_to_its_limits():
     fields = {"count": 2000, "elevation": [20, 60], "azimuth": [-30, 30], "distance": [4, 6], "tilt": [-5, 5]}
     views = np.array([make(kind="sphere", **fields).view(i) for i in range(2000)])
@@ -136,6 +137,7 @@ def test_a_band_of_the_sphere_keeps_to_its_limits():
     assert 20 <= views[:, 1].min() < views[:, 1].max() <= 60
 
 
+@pytest.mark.slow
 def test_normal_draws_have_their_mean_and_spread():
     fields = {"azimuth": 30, "elevation": 15, "distance": 5, "tilt": 1, "sd": {"azimuth": 20, "elevation": 5, "distance": 0.3}}
     views = np.array([make(kind="normal", count=3000, **fields).view(i) for i in range(3000)])
@@ -240,6 +242,7 @@ def views_of(names, viewpoints, **changes):
 
 
 @pytest.mark.parametrize("kind", RANDOM)
+@pytest.mark.slow
 def test_random_viewpoints_are_drawn_for_each_model(kind):
     names = [f"mug_{i}" for i in range(20)]
     own, shared = (views_of(names, RANDOM[kind] | more) for more in ({}, {"shared": True}))

@@ -60,6 +60,7 @@ def bricks(count):
     return [shape_of(corners * rng.uniform((0.2, 0.2, 0.06), (0.3, 0.3, 0.1))) for _ in range(count)]
 
 
+@pytest.mark.slow
 def test_piles_stand_by_themselves():
     shapes = bricks(6)
     poses = fallen(shapes, "stack", given={"high": 3}, gap=0.1)

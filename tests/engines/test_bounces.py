@@ -104,6 +104,7 @@ def walls(low, high, count: int = 12) -> tuple[np.ndarray, np.ndarray]:
 
 
 @pytest.mark.parametrize("reflectance", [0.0, 0.5, 0.8])
+@pytest.mark.slow
 def test_a_closed_box_that_glows_evenly(reflectance):
     """Everywhere light is that of one wall over one less its reflectance: the furnace."""
     low, high = (-1.0, -0.8, -0.6), (1.0, 0.8, 0.6)
@@ -124,6 +125,7 @@ def test_a_closed_box_that_glows_faintly_beside_a_sunlit_wall():
     np.testing.assert_allclose(light, 0.05, rtol=0.02)
 
 
+@pytest.mark.slow
 def test_further_bounces_are_foretold_where_two_walls_take_turns(monkeypatch):
     """A sunlit wall and a shaded one: of each patch, light is what it is when all bounces are followed."""
     walls = (box((-1, -1, 0), (1, 1, 1)), matt(0.6)), (box((1.5, -1, 0), (2.5, 1, 2)), matt(0.9))
@@ -320,6 +322,7 @@ def test_a_lamp_at_the_ceiling_leaves_no_flecks_around_it():
 
 
 @pytest.mark.parametrize("window", quick([True, False], True))
+@pytest.mark.slow
 def test_a_dark_room_beside_a_lit_one_stays_dark(window, monkeypatch):
     """A partition of 10 cm, less than half of what lies between probes; without a window a lamp stands in the first room."""
     monkeypatch.setattr(lightmaps, "CELL", 0.1)
@@ -429,6 +432,7 @@ def test_workers_of_a_place_find_these_kernels_compiled():
     assert is_bounced(raster.stage(tiny, lambda spec, step=None: warm._card()))
 
 
+@pytest.mark.slow
 def test_a_green_ball_colours_the_ground_and_its_neighbour():
     green = replace(ball(0.4, (0, 0, 0.4)), materials=(replace(matt(0.5), base_color=(0.05, 0.6, 0.05, 1.0)),))
     scene = Scene(sun=Sun(azimuth=0, elevation=50), sky=EVEN, ground=Ground(), finish=OUT)

@@ -95,6 +95,7 @@ def errors(mesh, lens):
 
 
 @pytest.mark.parametrize(("name", "pane", "lens"), quick(PAIRS, *PAIRS[::2]))
+@pytest.mark.slow
 def test_outlines_behind_a_pane_are_smooth(name, pane, lens):
     """Of a straight edge's coverage four samples know 0.09 or so, and at worst 0.25; one sample 0.25 and 0.5."""
     smooth, jagged = errors(behind(pane)[name], LENSES[lens])

@@ -57,6 +57,7 @@ def assert_equal(some, others):
         np.testing.assert_array_equal(a, b)
 
 
+@pytest.mark.slow
 def test_a_sky_is_baked_once_and_equal_with_and_without_the_cache(sky, bakes, monkeypatch):
     made = baked(sky)
     assert len(bakes) == 1
@@ -68,6 +69,7 @@ def test_a_sky_is_baked_once_and_equal_with_and_without_the_cache(sky, bakes, mo
     assert len(bakes) == 2
 
 
+@pytest.mark.slow
 def test_skies_with_and_without_ground_and_other_skies_differ(bakes, tmp_path):
     file = tmp_path / "sky.exr"
     for pixels in (sunny(4000.0), sunny(3000.0)):
@@ -88,6 +90,7 @@ def test_equal_files_share_an_entry(bakes, tmp_path):
 
 
 @pytest.mark.parametrize("place", [0, 40, -40])
+@pytest.mark.slow
 def test_a_damaged_sky_is_baked_anew(sky, bakes, place):
     made = [np.array(values) for values in baked(sky)]  # copies, as the arrays themselves are mapped from the entry
     for entry in cache_of("light").iterdir():
@@ -99,6 +102,7 @@ def test_a_damaged_sky_is_baked_anew(sky, bakes, place):
 
 
 @pytest.mark.parametrize("limit", ["1", "5000"])
+@pytest.mark.slow
 def test_a_sky_that_the_limit_refuses_is_baked_each_time(sky, bakes, monkeypatch, limit):
     monkeypatch.setenv("VIEWSPHERE_CACHE_LIMIT", limit)
     assert_equal(baked(sky), baked(sky))

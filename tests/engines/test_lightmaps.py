@@ -61,6 +61,7 @@ def seen_share(places: np.ndarray, normals: np.ndarray, corners: np.ndarray) -> 
 
 
 @pytest.mark.parametrize("reflectance", [0.0, 0.5, 0.8])
+@pytest.mark.slow
 def test_a_closed_box_that_glows_evenly(reflectance):
     stage = stage_of(painted_mesh((inside_out(box(LOW, HIGH)), matt(reflectance, 1.0))), Scene(sun=None, sky=DARK))
     light = mapped(stage, *(values.reshape(-1, 3) for values in walls(LOW, HIGH)))
@@ -68,6 +69,7 @@ def test_a_closed_box_that_glows_evenly(reflectance):
 
 
 @pytest.mark.parametrize("place", ["opposite", "beside"])
+@pytest.mark.slow
 def test_a_ceiling_that_glows(place):
     """What each place of the floor and of a wall has before any bounce: the ceiling's share of what is seen."""
     faces = inside_out(box(LOW, HIGH)).reshape(6, 2, 3, 3)

@@ -78,6 +78,7 @@ def test_lens_opens_for_sun_and_sky_alike_and_not_for_strength():
 
 @pytest.mark.parametrize("sky", [Daylight(), Daylight(clouds=1), Sky()], ids=["clear", "overcast", "gradient"])
 @pytest.mark.parametrize("shade", [0.95, 0.5, 0.1])
+@pytest.mark.slow
 def test_no_dark_line_where_ground_and_sky_meet(sky, shade):
     """Down a column without an object: between the sky's level and the ground's, never darker than both."""
     scene = Scene(sun=Sun(azimuth=30), sky=sky, ground=Ground(pattern="plain", color=(shade, shade, shade)))
@@ -111,6 +112,7 @@ def test_missing_normals_are_flat_not_black():
 
 @pytest.mark.parametrize("shade", [0.0, 0.9])
 @pytest.mark.parametrize("kind", ["point", "spot", "area"])
+@pytest.mark.slow
 def test_no_light_gets_out_of_a_closed_box(kind, shade):
     """Nor by the ground, which would throw it back, nor at its foot."""
     box = flat(cuboid((-0.6, -0.6, -0.6), (0.6, 0.6, 0.6)))

@@ -98,6 +98,7 @@ def test_a_corner_and_under_a_table_against_rays(ground):
 
 @pytest.mark.parametrize("quality", ["fast", "fine"])
 @pytest.mark.parametrize("tilt", [0.0, 33.0, 90.0])
+@pytest.mark.slow
 def test_an_open_plane_and_a_ball_are_open(quality, tilt):
     c, d = math.cos(math.radians(tilt)), math.sin(math.radians(tilt))
     plane = LightStage(flat(quad((-1, -c, -d), (2, 0, 0), (0, 2 * c, 2 * d))), ground=False)
@@ -203,6 +204,7 @@ def bakes(monkeypatch, tmp_path):
     return made
 
 
+@pytest.mark.slow
 def test_the_occlusion_of_a_target_alone_is_kept_for_other_runs(bakes):
     stage = LightStage(flat(cuboid((-0.5, -0.5, 0), (0.5, 0.5, 1))))
     first, again = (bake_occlusion(stage.casters, True, "fast", is_alone=True) for _ in range(2))

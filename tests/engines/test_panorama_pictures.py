@@ -87,6 +87,7 @@ def from_faces(sample, faces):
 
 
 @pytest.mark.parametrize("name", ["pano", "turned", "cylinder"])
+@pytest.mark.slow
 def test_matt_colours_are_those_of_six_pinholes(name, matt):
     samples = by_sensor(matt)
     sample = samples[name]
@@ -107,6 +108,7 @@ def test_a_quarter_turn_moves_the_columns_of_every_channel(matt):
         assert (apart > most * (1 + np.where(np.isfinite(b.reshape(*apart.shape, -1)[..., 0]), 1, 0))).sum() <= 3, channel
 
 
+@pytest.mark.slow
 def test_check_proves_it(matt):
     report = check(matt)
     assert report.ok, report.findings

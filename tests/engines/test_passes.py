@@ -140,6 +140,7 @@ BACKGROUNDS = {
 
 @pytest.mark.parametrize("where", BACKGROUNDS)
 @pytest.mark.parametrize("catcher", [False, True])
+@pytest.mark.slow
 def test_albedo_times_shading_and_the_rest_is_the_picture(where, catcher):
     """Exposed and developed as every picture is; a byte may be rounded the other way."""
     background, name = BACKGROUNDS[where]

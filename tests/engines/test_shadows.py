@@ -252,6 +252,7 @@ NEAR_A_LID = {
 @pytest.mark.parametrize("kind", NEAR_A_LID)
 @pytest.mark.parametrize("above", quick([0.02, 0.06, 0.1, 0.3], 0.02, 0.1, 0.3))
 @pytest.mark.parametrize("overhang", quick([0.002, 0.005, 0.01, 0.02], 0.002, 0.01))
+@pytest.mark.slow
 def test_a_lamp_above_a_lid_leaves_no_light_on_the_ledge_beneath_it(kind, above, overhang):
     """Also where the lid cuts through the lamp; and hardly any on a bevel whose own plane cuts through the lamp."""
     stage, reach = chest(overhang)
@@ -474,6 +475,7 @@ def prism(sides, turn, radius=0.6, height=1.2):
 
 @pytest.mark.parametrize("kind", ["ball", "level area", "upright area"])
 @pytest.mark.parametrize("sides", quick([3, 4, 6, 24], 3, 24))
+@pytest.mark.slow
 def test_lamps_in_closed_prisms_light_nothing_outside(kind, sides):
     """However many walls there are and however they are turned; places from half a millimetre beside the foot to 3 m away."""
     rng = np.random.default_rng(sides)

@@ -59,6 +59,7 @@ def step_samples(where, away=0.0):
 
 
 @pytest.mark.parametrize("tilt", [0.0, 90.0, 180.0])
+@pytest.mark.slow
 def test_it_moves_with_the_target(tilt):
     still, moved = pose(tilt=tilt), pose(3.0, -7.0, 2.0, 40.0, tilt)
     found = []
@@ -70,6 +71,7 @@ def test_it_moves_with_the_target(tilt):
 
 
 @pytest.mark.parametrize("tilt", [0.0, 3.0, 17.0, 50.0, 120.0])
+@pytest.mark.slow
 def test_a_target_in_any_tilt_against_rays(tilt):
     pytest.importorskip("embreex")
     where = pose(0.3, 0.2, 1.5, 25.0, tilt)

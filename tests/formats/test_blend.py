@@ -272,6 +272,7 @@ def test_blend_is_a_format_that_cannot_be_imported():
 
 
 @pytest.mark.parametrize("world", quick(["videos", "drives"], "videos"))
+@pytest.mark.slow
 def test_each_sensor_of_a_rig_has_files_of_its_own(asked, world, request, tmp_path):
     dataset = request.getfixturevalue(world)
     export(dataset.root, ["blend"], output=tmp_path)

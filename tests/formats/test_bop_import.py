@@ -40,6 +40,7 @@ def imported(exported, tmp_path_factory):
     return Dataset(out)
 
 
+@pytest.mark.slow
 def test_poses_masks_and_depth_come_in(stills, imported):
     pairs = {(s.split, s.source["im_id"]): s for s in imported}
     assert len(imported) == len(stills) and imported.splits == ("test", "train", "val")

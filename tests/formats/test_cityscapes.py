@@ -179,6 +179,7 @@ def test_labels_by_name():
     assert list(INSTANCES) == list(range(24, 34)) and LABELS[26] == "car" and LABELS[7] == "road" and LABELS[23] == "sky"
 
 
+@pytest.mark.slow
 def test_hostile_names_and_empty_pictures(tmp_path, monkeypatch):
     names = ('hair "drier" & co', "Große Schüssel 漢字", "  Bus ")
     monkeypatch.setattr(cube_dataset, "CATEGORIES", tuple(Category(i, name, "") for i, name in enumerate(names, 1)))

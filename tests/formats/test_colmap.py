@@ -62,6 +62,7 @@ def images(dataset, folder):
 
 @pytest.mark.parametrize("kind", ["text", "binary"])
 @pytest.mark.parametrize("world", ["stills", "poses", "videos"])
+@pytest.mark.slow
 def test_pycolmap_reads_cameras_and_poses(world, kind, request, shared):
     dataset = request.getfixturevalue(world)
     folder = shared(dataset, kind)
@@ -166,6 +167,7 @@ OTHERS = {
 
 
 @pytest.mark.parametrize(("name", "kind"), [*zip(OTHERS, cycle(KINDS), strict=False)])
+@pytest.mark.slow
 def test_lenses_of_colmap_s_own(name, kind, tmp_path):
     """pycolmap projects as the data set does, and viewsphere reads the same lens again."""
     lens = LENS.model_copy(update={"distortion": OTHERS[name], "cx": 47.25})

@@ -112,6 +112,7 @@ def test_depth_is_where_the_camera_says(stills, written):
         close("hdf5", "own rays: distance over depth", far / found["distance"][seen], 1.0, rtol=1e-6)
 
 
+@pytest.mark.slow
 def test_the_bytes_are_the_same_at_any_time(stills, written, tmp_path):
     time.sleep(1.1)  # HDF5 counts seconds
     export(stills.root, [{"hdf5": {"keys": STILL}}], output=tmp_path)

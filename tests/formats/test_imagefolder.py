@@ -92,6 +92,7 @@ def test_torchvision_reads_it(stills, written, by):
 
 @pytest.mark.filterwarnings("ignore")
 @pytest.mark.parametrize("by", ["category", "pose_category"])
+@pytest.mark.slow
 def test_datasets_reads_it(datasets, stills, written, by, tmp_path):
     found = datasets.load_dataset(str(written("stills", by)), cache_dir=str(tmp_path))
     assert tuple(found) == stills.splits

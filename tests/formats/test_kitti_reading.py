@@ -83,6 +83,7 @@ def lines_of(file):
 
 
 @pytest.mark.parametrize("task", ["object", "tracking"])
+@pytest.mark.slow
 def test_an_export_comes_back_and_goes_out_equal(task, stills, drives, tmp_path):
     own = stills if task == "object" else drives
     export(own.root, [{"kitti": {"task": task}}], output=tmp_path / "one")

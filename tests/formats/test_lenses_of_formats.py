@@ -80,6 +80,7 @@ def leaves_it_out(name: str) -> bool:
     return "Not stored:" in told and "the lens' distortion" in told
 
 
+@pytest.mark.slow
 def test_a_format_that_writes_the_focal_length_writes_the_lens_too(tmp_path):
     """Of every format that takes the lens: a tree with the focal length has the lens's numbers too, or the page says not."""
     generate(recipe(MARKED), tmp_path / "out", workers=0)

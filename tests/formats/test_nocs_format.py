@@ -156,6 +156,7 @@ def odd(tmp_path_factory):
     return Dataset(out)
 
 
+@pytest.mark.slow
 def test_objects_without_annotations_are_distractors(odd, tmp_path):
     export(odd.root, "nocs", output=tmp_path)
     left_out = 0

@@ -82,6 +82,7 @@ def corners(record):
 
 
 @pytest.mark.parametrize("world", ["videos", "drives"])
+@pytest.mark.slow
 def test_sensors_and_chains(request, written, world):
     dataset, tables = request.getfixturevalue(world), Tables(written(world))
     for name in dataset.sequences:

@@ -107,6 +107,7 @@ def test_models_of_all_files_are_the_same(stills, written):
     assert points == sum(len(info.keypoints.points) for info in stills.models if info.keypoints)
 
 
+@pytest.mark.slow
 def test_lists_and_a_picture_without_objects(stills, written, tmp_path):
     for split in stills.splits:
         expected = [f"{sample.index:08d}" for sample in stills if sample.split == split]

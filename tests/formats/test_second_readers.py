@@ -682,6 +682,7 @@ TRACKING = ["frame", "id", "type", "truncated", "occluded", "alpha", "left", "to
 TRACKING += ["height", "width", "length", "x", "y", "z", "rotation_y"]
 
 
+@pytest.mark.slow
 def test_kitti_tracking(drives, tmp_path):
     root = written(drives, tmp_path, "kitti", task="tracking")
     training = root / "training"

@@ -135,6 +135,7 @@ def test_lenses_that_change(tmp_path):
 
 
 @pytest.mark.parametrize("kind", ["tum", "icl-nuim"])
+@pytest.mark.slow
 def test_a_sequence_comes_in_as_it_went_out(videos, kind, tmp_path):
     folder = written(videos, tmp_path / "made", kind)
     for world in videos.sequences:

@@ -143,6 +143,7 @@ def test_maps_of_version_2(videos, two):
                 close("vkitti", "OpenCV: scene flow", metres, expected, "m", atol=10 / 65535 * 1.01)
 
 
+@pytest.mark.slow
 def test_texts_of_version_2(videos, two):
     for sequence in videos.sequences:
         tables = {}

@@ -41,6 +41,7 @@ def least_first(pair):
     return pair.least - pair.most
 
 
+@pytest.mark.slow
 def test_tuples_whose_fields_change_places_have_entries_of_their_own(tmp_path, monkeypatch):
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
     for fields in (("least", "most"), ("most", "least")):

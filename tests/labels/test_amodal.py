@@ -141,6 +141,7 @@ def random_scene(seed, lens):
 @pytest.mark.parametrize("lens", LENSES)
 @settings(max_examples=12, derandomize=True, deadline=None, database=None)
 @given(seed=st.integers(0, 10**6))
+@pytest.mark.slow
 def test_random_scenes_prove_themselves_and_come_back(lens, seed):
     sample = sample_of(random_scene(seed, lens))
     assert proofs(sample) == []
@@ -155,6 +156,7 @@ def test_random_scenes_prove_themselves_and_come_back(lens, seed):
 @pytest.mark.parametrize("lens", LENSES)
 @settings(max_examples=8, derandomize=True, deadline=None, database=None)
 @given(seed=st.integers(0, 10**6))
+@pytest.mark.slow
 def test_embree_sees_the_same_hidden_parts(lens, seed):
     """Rays at each object alone are its amodal mask; the first of all hits is what hides it. Rays within rounding of an edge
     may meet one or the other: fewer than 1 pixel in 2,000.

@@ -230,6 +230,7 @@ def objects_of(dataset):
     return [(sample, o) for sample in dataset for o in sample.objects]
 
 
+@pytest.mark.slow
 def test_the_models_have_the_symmetries_that_they_were_made_with(known):
     counted = {
         name: (len(info["symmetries_discrete"]), len(info["symmetries_continuous"])) for name, (info, _, _) in known.items()
@@ -385,6 +386,7 @@ def spun(files, tmp_path_factory):
 
 
 @pytest.mark.parametrize("name", ["star", "cylinder"])
+@pytest.mark.slow
 def test_spinning_symmetric_things_stand_still(spun, name):
     """The poses differ from instant to instant, the canonical ones do not."""
     poses, canonical = (

@@ -169,6 +169,7 @@ def kept(tmp_path_factory):
     return Dataset(root)
 
 
+@pytest.mark.slow
 def test_they_are_kept_as_they_are_in_memory(kept):
     for one, again in zip(kept, vs.render(recipe()), strict=True):
         assert one.captions == again.captions and one.referring == again.referring
@@ -223,6 +224,7 @@ def test_scenes_are_painted_and_have_weather():
         assert not {"navy", "yellow", "green"} & {word for text in texts for word in text.split()}
 
 
+@pytest.mark.slow
 def test_sentences_hold_in_a_merged_data_set_whose_categories_have_other_numbers(tmp_path):
     models = [{"source": f"zoo:{name}", "category": name, "count": 1} for name in ("post_box", "wheelie_bin")]
     scenes = {"count": 1, "objects": 2, "layout": "row"}
@@ -267,6 +269,7 @@ def test_mistakes_are_told_before_rendering(options, told):
         vs.plan(recipe(labels={"captions": options}))
 
 
+@pytest.mark.slow
 def test_nothing_is_told_of_nothing():
     found = [
         sample

@@ -198,6 +198,7 @@ TIED = {**KINDS, "cube": {"discrete": CUBE}, "hexagonal prism": {"discrete": HEX
 
 @pytest.mark.parametrize("kind", TIED)
 @pytest.mark.parametrize("noise", [0, 1e-12])
+@pytest.mark.slow
 def test_equally_near_poses_have_one_canonical_pose(kind, noise):
     symmetries, rng = Symmetries.model_validate(TIED[kind]), np.random.default_rng(6)
     for rotation in grid():

@@ -8,6 +8,7 @@ from viewsphere.validation.errors import Nearest, nearest
 from viewsphere.validation.suggestions import suggestion
 
 
+@pytest.mark.slow
 def test_as_many_names_are_compared_as_are_shown(monkeypatch: pytest.MonkeyPatch):
     compared = list[object]()
     monkeypatch.setattr(mistakes, "suggestion", lambda name, known: compared.append(name) or suggestion(name, known))  # pyright: ignore

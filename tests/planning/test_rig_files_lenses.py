@@ -321,6 +321,7 @@ def test_broken_xml_is_one_line(tmp_path):
         assert "\n" not in str(error.value)
 
 
+@pytest.mark.slow
 def test_a_data_set_of_such_a_rig_passes_check(tmp_path):
     (tmp_path / "cameras.txt").write_text("1 FOV 64 48 30 30 32 24 0.8\n")
     recipe = small_recipe(rig={"file": str(tmp_path / "cameras.txt")}, channels=["rgb", "depth", "instances"], formats=[])

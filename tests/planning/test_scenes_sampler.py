@@ -67,6 +67,7 @@ def test_a_number_is_short_for_so_many_scenes():
     ("by", "views"),
     quick([("model", None), ("model", 2), ("pose", 2), ("place", None), ("frame", 2)], ("model", 2), ("place", None)),
 )
+@pytest.mark.slow
 def test_a_scene_is_the_same_however_many_there_are(by, views):
     more = {"splits": {"by": by, "train": 0.5, "val": 0.5}, "scenes": {"views": views}}
     more |= {"scene": {"place": {"source": "zoo:neighbourhood", "draw": "per_model"}, "sun": {"azimuth": [0, 360]}}}

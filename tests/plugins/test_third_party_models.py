@@ -111,6 +111,7 @@ def spec_of(source):
     return ModelSpec(key="a", source=source, seed=1, category="a", category_id=1)
 
 
+@pytest.mark.slow
 def test_files_of_a_moving_family_of_another_package_are_not_kept_in_the_cache(install, monkeypatch, tmp_path):
     scratch_cache(monkeypatch, tmp_path / "cache")
     install("families", "walker", WALKER)

@@ -175,6 +175,7 @@ def test_a_stereo_rig_of_it_has_all_other_labels():
     assert plan(parallel_recipe(rig=STEREO)).frames == 24
 
 
+@pytest.mark.slow
 def test_a_data_set_of_it_is_proved_and_read_back(tmp_path):
     generate(
         parallel_recipe(formats=["native", "coco", "pointcloud"], annotations=["amodal", "obb"]), tmp_path / "out", workers=0
@@ -193,6 +194,7 @@ def test_a_data_set_of_it_is_proved_and_read_back(tmp_path):
     assert '"model": "orthographic"' in json.dumps(json.loads(coco.read_text("utf-8")))
 
 
+@pytest.mark.slow
 def test_a_tampered_pixel_is_found(tmp_path):
     """A depth that is 1 % off, and a box a pixel off, contradict the exported models."""
     generate(parallel_recipe(formats=[]), tmp_path / "out", workers=0)

@@ -86,6 +86,7 @@ def test_a_sensor_has_it_too_and_shares_a_cameras():
 
 
 @pytest.mark.usefixtures("barrel")
+@pytest.mark.slow
 def test_a_data_set_made_with_it_passes_check(tmp_path):
     generate(small_recipe(camera=CAMERA, formats=[]), tmp_path / "out", workers=0)
     assert not check(Dataset(tmp_path / "out")).findings

@@ -41,6 +41,7 @@ def test_a_sensor_s_noise_follows_from_its_name():
     assert not np.array_equal(three["x"], three["b"])
 
 
+@pytest.mark.slow
 def test_stored_pictures_are_those_in_memory_and_those_painted_again(tmp_path):
     generate(recipe(rig=PAIR), tmp_path / "out", workers=0)
     dataset = Dataset(tmp_path / "out")

@@ -49,6 +49,7 @@ def test_surface_layers_exclude_one_another(page):
     page.click("#layers [data-layer=normals]")
 
 
+@pytest.mark.slow
 def test_still_pictures_have_no_player(page):
     assert page.is_hidden("#sequences")
     assert page.is_hidden("#to-sequences")

@@ -69,6 +69,7 @@ def test_nothing_is_played_of_still_pictures(small_dataset):
     assert "points" not in frame_data(small_dataset[0])
 
 
+@pytest.mark.slow
 def test_instants_name_the_frames_that_the_page_shows(moving):
     (first, second) = films_of(moving)
     shown = sorted(place for places in (*first.places, *second.places) for place in places)

@@ -143,6 +143,7 @@ def test_workers_and_the_command_line_keep_memory_and_not_the_users_process(proc
         {"GLIBC_TUNABLES": "glibc.malloc.trim_threshold=1"},
     ],
 )
+@pytest.mark.slow
 def test_who_tells_the_allocator_something_is_obeyed(environment):
     told, _ = answered(NEW_PAGES, FRAME, **environment)
     assert not told

@@ -53,6 +53,7 @@ def test_the_bytes_are_those_of_a_real_run(tmp_path):
     assert expected == pytest.approx(disk_bytes(folders), rel=0.25)
 
 
+@pytest.mark.slow
 def test_the_command_says_it_in_one_line(tmp_path):
     (tmp_path / "recipe.yaml").write_text(
         "models: [{source: zoo:post_box}]\nviewpoints: {azimuth: [0, 90], distance: 1}\n"

@@ -143,6 +143,7 @@ def test_frames_of_all_kinds_of_labels_hold_something(rendered):
     assert all(sample.captions and sample.referring for sample in samples if sample.sensor == "left")
 
 
+@pytest.mark.slow
 def test_merging_gives_other_categories_as_they_would_be_rendered(rendered, tmp_path):
     """The second data set's categories have another order, and so other ids, in the first one and in the merged one."""
     first, second = rendered("flat", "cube"), rendered("pole", "cube", "flat", seed=2)

@@ -49,6 +49,7 @@ def in_order():
 @pytest.mark.parametrize(
     ("count", "shuffle", "channels"), [(2, True, ["rgb", "depth"]), (5, False, ["depth"]), (13, True, ["depth"])]
 )
+@pytest.mark.slow
 def test_shares_have_every_frame_once(count, shuffle, channels, in_order):
     recipe = quick_recipe(channels=channels)
     shares = [list(vs.render(recipe, shard=(k, count), shuffle=shuffle)) for k in range(count)]

@@ -186,6 +186,7 @@ def test_what_is_there_is_whole_and_what_was_finished_is_there(what, sources, di
         assert tree_hash(place / "out") == whole
 
 
+@pytest.mark.slow
 def test_without_it_shots_may_be_torn(sources, disk, monkeypatch):
     monkeypatch.delenv(moving.DURABILITY, raising=False)
     with disk.watched():
@@ -194,6 +195,7 @@ def test_without_it_shots_may_be_torn(sources, disk, monkeypatch):
     assert not disk.contents
 
 
+@pytest.mark.slow
 def test_it_changes_no_byte(sources, tmp_path, monkeypatch):
     monkeypatch.setenv(moving.DURABILITY, "fsync")
     generate(RECIPE, tmp_path / "synced", formats=[])

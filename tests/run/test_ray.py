@@ -51,6 +51,7 @@ def test_without_ray_the_extra_is_named(tmp_path, monkeypatch):
         ("CLOSED", "Connection refused: start one with `ray start"),
     ],
 )
+@pytest.mark.slow
 def test_where_no_cluster_answers_it_is_said_in_one_line(tmp_path, address, found):
     pytest.importorskip("ray")
     with socket.socket() as nobody:

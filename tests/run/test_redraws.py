@@ -41,6 +41,7 @@ def scenes_on(side, objects, count=4, **more):
     return {"count": count, "objects": objects, "gap": 0.02, "surface": {"size": [side, side], "height": 0.5}, **more}
 
 
+@pytest.mark.slow
 def test_models_without_room_are_placed_again_and_one_is_left_out_at_last(monkeypatch):
     monkeypatch.setenv("VIEWSPHERE_MAX_REDRAWS", "16")
     shots = composed(recipe_of(scenes=scenes_on(0.55, [1, 4])))

@@ -34,6 +34,7 @@ def written_at(folder):
     return {path: path.stat().st_mtime_ns for path in folder.rglob("*") if path.is_file()}
 
 
+@pytest.mark.slow
 def test_it_does_not_import_numba(finished):
     _, file, out = finished
     run = subprocess.run([sys.executable, "-c", REPEATED, file, out], capture_output=True, text=True, check=True)

@@ -31,6 +31,7 @@ def test_a_run_tells_what_the_unused_channels_take_on_disk(tmp_path):
     assert note.startswith(f"note: {order} are {share:.0%} of the frames' bytes and no format uses them (coco): leave them out")
 
 
+@pytest.mark.slow
 def test_nothing_is_said_where_a_format_takes_all_or_there_is_none(tmp_path):
     assert notes_of(tmp_path / "ds", []) == []
     assert len(notes_of(tmp_path / "ds", ["csv"])) == 1  # which takes pictures, and needs no channel
@@ -38,6 +39,7 @@ def test_nothing_is_said_where_a_format_takes_all_or_there_is_none(tmp_path):
     assert notes_of(tmp_path / "ds", ["coco"]) == []  # native lies beside it
 
 
+@pytest.mark.slow
 def test_a_format_that_cannot_be_written_here_is_no_error(tmp_path, monkeypatch):
     def refuse():
         raise AssertionError

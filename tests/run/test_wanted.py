@@ -48,6 +48,7 @@ def test_models_are_cut_off_as_much_as_is_wanted(tmp_path):
 
 
 @pytest.mark.parametrize("distance", [1.5, {"fill": 0.3}])
+@pytest.mark.slow
 def test_what_is_looked_at_is_where_the_recipe_says(distance):
     view = {"azimuth": [10, 130], "elevation": 20, "tilt": 15, "distance": distance}
     center = {"off_center": [0.2, -0.25]}

@@ -75,6 +75,7 @@ def error(here, there, xy, state):
     return np.abs(found - here.rgb[seen]).mean() / 255
 
 
+@pytest.mark.slow
 def test_the_next_and_the_last_picture_warped_by_flow_are_this_one(made):
     samples, errors, still = by_name(made[1]), [], []
     for sensor in ("left", "right"):

@@ -61,6 +61,7 @@ def equal(one, other):
             assert np.array_equal(a.channels[name], b.channels[name], equal_nan=True), name
 
 
+@pytest.mark.slow
 def test_frames_and_exports_are_those_of_files(pair):
     files, packed = map(Dataset, pair)
     equal(files, packed)

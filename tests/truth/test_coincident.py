@@ -47,6 +47,7 @@ def camera_before(rng, name, normal, middle):
 
 @pytest.mark.parametrize("name", EVERY)
 @pytest.mark.parametrize("swapped", [False, True])
+@pytest.mark.slow
 def test_of_two_surfaces_in_one_plane_the_first_is_seen_all_over(name, swapped):
     """Tilted, cut into different triangles, their corners rounded to float32: no camera sees a mixture."""
     rng, overlap = np.random.default_rng(4), 0

@@ -108,6 +108,7 @@ def bar(bend):
 
 @pytest.mark.parametrize("name", EVERY)
 @pytest.mark.parametrize("moves", [False, True])
+@pytest.mark.slow
 def test_a_skinned_bar_moves_with_its_triangles(name, moves):
     rng = np.random.default_rng(5)
     camera = orbit_camera(lens(96, 72, 2.0 if name == "fisheye" else 0.8, EVERY[name]), 0.2, 0.3, 3.0)

@@ -175,6 +175,7 @@ def test_disparity_times_depth_is_focal_length_times_baseline():
         ("disparity_state", (0, "right")),
     ),
 )
+@pytest.mark.slow
 def test_states_are_those_of_brute_force(name, where):
     context = whole(sky=False)
     own, there = context.neighbours.views[0, None], context.neighbours.views[where]

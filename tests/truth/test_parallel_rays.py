@@ -132,6 +132,7 @@ def test_what_is_behind_the_plane_of_the_camera_is_cut_off_exactly():
 
 @PROFILE
 @given(seed=st.integers(0, 10**6))
+@pytest.mark.slow
 def test_every_pixel_of_a_scene_shows_what_its_ray_meets_first(seed):
     pytest.importorskip("embreex")
     from test_scene_embree import scene

@@ -34,6 +34,7 @@ def random_camera(rng, name, width=64, height=48):
 
 
 @pytest.mark.parametrize("name", EVERY)
+@pytest.mark.slow
 def test_states_of_random_points_are_those_of_brute_force(name):
     """Points on things of all sizes, some around the camera; in front, behind, beside, below the ground's horizon."""
     rng = np.random.default_rng(sum(map(ord, name)))
@@ -55,6 +56,7 @@ def test_states_of_random_points_are_those_of_brute_force(name):
 
 
 @pytest.mark.parametrize("name", EVERY)
+@pytest.mark.slow
 def test_states_of_pixels_are_those_of_brute_force(name):
     rng = np.random.default_rng(sum(map(ord, name)) + 1)
     for _ in range(4):

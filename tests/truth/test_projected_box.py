@@ -40,6 +40,7 @@ MODELS = {
 
 @pytest.mark.parametrize("name", quick(STRONG, *(STRONG.keys() - {"folding", "barrel", "shifted"})))
 @given(seed=st.integers(0, 10**6), model=st.sampled_from(sorted(MODELS)))
+@pytest.mark.slow
 def test_no_pixel_of_a_model_lies_outside_its_box(name, seed, model):
     """Nor is the box larger than its pixels by more than gaps between pixel centres allow, for a ball that fills some."""
     rng = np.random.default_rng(seed)

@@ -124,6 +124,7 @@ def test_damage_is_told_and_the_rest_goes_on(small_dataset):
             live.sample(int(known.frames["number"][known.damaged][0]))
 
 
+@pytest.mark.slow
 def test_a_shot_that_is_made_again_is_read_anew(small_dataset):
     store = small_dataset.store
     key = next(iter(sorted(store.finished())))
@@ -144,6 +145,7 @@ def test_a_shot_that_is_made_again_is_read_anew(small_dataset):
         assert live.state()["finished"] == 12
 
 
+@pytest.mark.slow
 def test_what_is_appended_is_known(tmp_path):
     from viewsphere import generate
 

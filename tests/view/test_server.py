@@ -136,6 +136,7 @@ def test_no_parameter_is_a_file(server, target):
 
 
 @pytest.mark.parametrize("inside", ["rgb", "frames.json", "shot.json", "manifest.json"])
+@pytest.mark.slow
 def test_links_that_lead_out_of_the_data_set_are_not_followed(serve, small_dataset, tmp_path, inside):
     folder = small_dataset.store.shot_folder(next(iter(sorted(small_dataset.store.finished()))))
     first = small_dataset.plan.find(folder.name).first
@@ -455,6 +456,7 @@ def test_headers_are_parsed_only_behind_the_token(server, monkeypatch):
 @pytest.mark.filterwarnings("error")
 @pytest.mark.parametrize("within", ["1e308,", ",1e308", "-1e308,1e308", "1e308,-1e308", "inf,", "-10,20"])
 @pytest.mark.parametrize("measure", ["azimuth", "distance", "visibility", "camera_azimuth"])
+@pytest.mark.slow
 def test_large_bounds_warn_of_nothing(server, within, measure, capfd):
     assert get(server, f"/rows?first=0&count=1&{measure}={within}")[0] == 200
     assert capfd.readouterr().err == ""

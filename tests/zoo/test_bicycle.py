@@ -112,6 +112,7 @@ OTHERS = {
 
 
 @pytest.mark.parametrize("name", quick(OTHERS, "road", "shock", "case"))
+@pytest.mark.slow
 def test_a_bicycle_is_sound_and_shows_its_outside(name: str) -> None:
     mesh = built(OTHERS[name])
     assert_sound(mesh, MOST)

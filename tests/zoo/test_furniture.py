@@ -60,6 +60,7 @@ def parameters(family: str, seed: int):
 
 
 @pytest.mark.parametrize("family", SIZES)
+@pytest.mark.slow
 def test_draws_are_sound_of_real_size_and_differ(family: str) -> None:
     meshes = [drawn(family, seed) for seed in SEEDS]
     for mesh in meshes:

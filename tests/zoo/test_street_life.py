@@ -64,6 +64,7 @@ def test_the_rest_of_a_place_is_the_same_whatever_its_traffic(name):
 
 
 @pytest.mark.parametrize("name", USUAL)
+@pytest.mark.slow
 def test_the_share_of_taken_bays_and_the_number_of_people(name):
     bays = cars = 0
     for seed in range(20):

@@ -119,6 +119,7 @@ def apart(motion, turn):
 
 @pytest.mark.parametrize("axes", ALONG)
 @pytest.mark.parametrize("name", quick(FINITE, *(FINITE.keys() - {"cube"})))
+@pytest.mark.slow
 def test_rotations_of_shapes_with_finitely_many(name, axes):
     make, turns = FINITE[name]
     mesh = make()

@@ -44,6 +44,7 @@ def elements(draw, depth=2):
 
 
 @given(elements())
+@pytest.mark.slow
 def test_the_tree_is_that_of_lxml(body):
     data = f'<r xmlns="one" xmlns:p="two" xmlns:x="three">{body}</r>'.encode()
     own = parsed(data)
