@@ -39,8 +39,9 @@ NEAREST = 1e9
 
 
 BEYOND = 4.0
-"""Distance of cameras with parallel rays, times the larger of the models' reach and half the picture's diagonal: from elevations
-above 14 degrees, all rays then begin above the ground.
+"""Distance of cameras with parallel rays, times the larger of the models' reach and half the picture's diagonal.
+
+From elevations above 14 degrees, all rays then begin above the ground.
 """
 
 
