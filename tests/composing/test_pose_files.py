@@ -260,8 +260,8 @@ def test_a_file_that_is_wrong_is_named_with_its_line(tmp_path, name, text, messa
 
 
 def test_what_colmap_may_have_wrong(tmp_path):
-    folder = colmap(tmp_path / "a", motions(2), "1 EQUIRECTANGULAR 640 480 640 480")
-    with pytest.raises(RecipeError, match=r"cameras.txt:2: expected one of SIMPLE_PINHOLE, .*; found EQUIRECTANGULAR"):
+    folder = colmap(tmp_path / "a", motions(2), "1 PERSPECTIVE 640 480 640 480")
+    with pytest.raises(RecipeError, match=r"cameras.txt:2: expected one of SIMPLE_PINHOLE, .*; found PERSPECTIVE"):
         make(folder)
     colmap(folder, motions(2), "7 PINHOLE 640 480 1 2 3 4")
     with pytest.raises(RecipeError, match=r"image image 000.png: expected a camera of cameras.txt; found 1"):

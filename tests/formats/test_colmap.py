@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import shutil
 from itertools import cycle, product
 
@@ -183,6 +184,39 @@ def test_lenses_of_colmap_s_own(name, kind, tmp_path):
         assert list(read_model(path).lenses.values()) == [lens]
         if kind == "text":
             assert read_colmap(path).intrinsics == lens
+
+
+ROUND = LENS.model_copy(update={"fx": 96 / math.tau, "fy": 72 / math.pi, "distortion": lens_parameters("equirectangular")})
+"""All directions, in pixels that are not square."""
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_panorama_of_all_directions(kind, tmp_path):
+    """pycolmap sees points all around where the data set does, its points lie where images show them, and it comes in again."""
+    dataset = make(tmp_path / "out", several=True, intrinsics=ROUND, channels=("rgb", "depth_ray", "instances"))
+    folder = written(dataset, tmp_path / "made", kind)
+    (model,) = models(folder).values()
+    (camera,) = model.cameras.values()
+    assert (camera.model.name, camera.params.tolist()) == ("EQUIRECTANGULAR", [96, 72])
+    points = np.random.default_rng(0).normal(size=(500, 3))
+    seen = np.array([camera.img_from_cam(point) for point in points])
+    close("colmap", "pycolmap: panorama", seen, project(ROUND, points)[0], "px", atol=1e-9)
+    close("colmap", f"pycolmap: points, panorama {kind}", *reprojected(model), "px", atol=1e-3)
+    path = folder / "several" / "sparse" / "0"
+    assert list(read_model(path).lenses.values()) == [ROUND]
+    if kind == "text":
+        assert read_colmap(path).intrinsics == ROUND
+    import_dataset("colmap", folder / "several", tmp_path / "in")
+    assert [sample.camera.intrinsics for sample in Dataset(tmp_path / "in")] == [ROUND] * len(dataset)
+
+
+@pytest.mark.parametrize(
+    "change", [{"fx": 96 / math.pi}, {"fy": 72.0}, {"cx": 47.0}, {"distortion": lens_parameters("cylindrical")}]
+)
+def test_other_panoramas_are_refused(change, tmp_path):
+    dataset = make(tmp_path / "out", intrinsics=ROUND.model_copy(update=change), channels=("rgb", "depth_ray"))
+    with pytest.raises(UserError, match=r"expected lenses of COLMAP's models; found (equirect|cylind)"):
+        written(dataset, tmp_path / "made", "text")
 
 
 def test_lenses_that_colmap_lacks_are_refused(tmp_path):

@@ -21,6 +21,7 @@ from viewsphere.check import check
 from viewsphere.composing.viewpoints.pose_files.nerfstudio import read_nerfstudio
 from viewsphere.errors import StoreError, UserError
 from viewsphere.geometry.camera import project
+from viewsphere.geometry.lenses import lens_parameters
 from viewsphere.run.datasets.importing import import_dataset
 from viewsphere.run.exports.exporting import export
 
@@ -159,6 +160,86 @@ def test_lenses(name, kind, tmp_path):
         close("nerfstudio", f"{kind}, OpenCV: {name} lens", pixels(camera, points), expected, "px", atol=1e-6)
 
 
+ARIA = (0.03, -0.004, 0.001, -0.0005, 0.0002, 0.0001, 0.001, -0.002, 0.0005, 0.0003, -0.0004, 0.0002)
+OWN = {
+    "EQUIRECTANGULAR": LENS.model_copy(
+        update={"fx": 96 / math.tau, "fy": 72 / math.pi, "distortion": lens_parameters("equirectangular")}
+    ),
+    "EQUIRECTANGULAR, in part": LENS.model_copy(
+        update={"fx": 40, "fy": 41, "cx": 47.25, "distortion": lens_parameters("equirectangular")}
+    ),
+    "ORTHOPHOTO": LENS.model_copy(update={"fx": 40, "fy": 41, "cx": 47.25, "distortion": lens_parameters("orthographic")}),
+    "FISHEYE624": LENS.model_copy(update={"cx": 47.25, "distortion": lens_parameters("fisheye624", coefficients=ARIA)}),
+}
+
+
+def their_rays(model, frame, xy):
+    """Origins and directions (N, 3) in the world, as nerfstudio's `Cameras._generate_rays_from_coords` computes them."""
+    x, y = ((xy - (frame["cx"], frame["cy"])) / (frame["fl_x"], frame["fl_y"])).T
+    zeros = np.zeros(len(xy))
+    origins, rotation, center = np.zeros((len(xy), 3)), *np.split(np.array(frame["transform_matrix"])[:3], [3], axis=1)
+    if model == "ORTHOPHOTO":
+        origins, inside = np.column_stack((x, -y, zeros)), np.column_stack((zeros, zeros, zeros - 1))
+    else:
+        theta, phi = -np.pi * x, np.pi * (0.5 + y)
+        inside = np.column_stack((-np.sin(theta) * np.sin(phi), np.cos(phi), -np.cos(theta) * np.sin(phi)))
+    return origins @ rotation.T + center.T, inside @ rotation.T
+
+
+def pixels_of_624(frame, inside):
+    """`fisheye624_project` of nerfstudio, of points in OpenCV's axes."""
+    k0, k1, k2, k3, k4, k5, p0, p1, s0, s1, s2, s3 = frame["distortion_params"]
+    a, b = (inside[:, :2] / inside[:, 2:]).T
+    r = np.hypot(a, b)
+    th = np.arctan(r)
+    bent = th + sum(k * th ** (3 + 2 * i) for i, k in enumerate((k0, k1, k2, k3, k4, k5)))
+    x, y = bent * a / r, bent * b / r
+    q = x * x + y * y
+    u = x + (2 * x * x + q) * p0 + 2 * x * y * p1 + s0 * q + s1 * q * q
+    v = y + (2 * y * y + q) * p1 + 2 * x * y * p0 + s2 * q + s3 * q * q
+    return np.column_stack((u * frame["fl_x"] + frame["cx"], v * frame["fl_y"] + frame["cy"]))
+
+
+@pytest.mark.parametrize("name", OWN)
+def test_nerfstudio_s_own_models(name, tmp_path):
+    """Its rays and pixels are those of the data set, which comes in again with its distances."""
+    lens, model = OWN[name], name.partition(",")[0]
+    distance = "depth" if lens.lens.has_depth else "depth_ray"
+    dataset = make(tmp_path / "out", several=True, intrinsics=lens, channels=("rgb", distance, "instances"))
+    folder = written(dataset, tmp_path / "made") / "several"
+    meta = json.loads((folder / "transforms.json").read_text())
+    assert meta["camera_model"] == model
+    xy = np.random.default_rng(1).uniform((0, 0), (96, 72), (300, 2))
+    for sample, frame in zip(dataset, meta["frames"], strict=True):
+        own = lens.lens.rays(xy)
+        if model == "FISHEYE624":
+            close("nerfstudio", "FISHEYE624: pixels", pixels_of_624(frame, own.directions), xy, "px", atol=1e-9)
+        else:
+            origins, directions = their_rays(model, frame, xy)
+            where = own.origins @ sample.camera.R + sample.camera.center
+            close("nerfstudio", f"{model}: origins of rays", origins, where, "m", atol=1e-12)
+            close("nerfstudio", f"{model}: rays", directions, own.directions @ sample.camera.R, atol=1e-12)
+    import_dataset("nerfstudio", folder, tmp_path / "in")
+    imported = Dataset(tmp_path / "in")
+    for sample, was in zip(imported, dataset, strict=True):
+        assert sample.camera.distortion == lens.distortion
+        close("nerfstudio", f"{model}: import", sample.camera.K, was.camera.K, "px", atol=1e-12)
+        found, expected = sample.channels[distance], was.channels[distance]
+        assert np.array_equal(np.isfinite(found), np.isfinite(expected))
+        seen = np.isfinite(expected)
+        close("nerfstudio", f"{model}: {distance}", found[seen], expected[seen], "m", atol=0.000501)
+    assert check(imported, rays=False).ok
+    pose = read_nerfstudio(folder / "transforms.json").intrinsics
+    close("nerfstudio", f"{model}: recipes", pose.K, lens.K, "px", atol=1e-12)
+    assert pose.distortion == lens.distortion
+    cloud = trimesh.load(folder / "points.ply")
+    surface = np.concatenate([sample.point_cloud("world").points for sample in dataset])
+    assert max(np.abs(surface - point).max(axis=1).min() for point in cloud.vertices[::17]) < 1e-5
+    for kind in ("instant-ngp", "nerf-synthetic"):
+        with pytest.raises(UserError, match="expected lenses of OpenCV's models; found"):
+            written(dataset, tmp_path / kind, kind=kind)
+
+
 def test_pictures_have_alpha_for_nerf(tmp_path):
     dataset = make(tmp_path / "out", several=True, channels=("rgb", "rgba", "depth", "instances"))
     folder = written(dataset, tmp_path / "made", kind="nerf-synthetic")
@@ -263,7 +344,7 @@ def test_what_is_broken_is_told(poses, tmp_path):
     assert "expected a transform_matrix of 4 x 4 numbers; found [[1, 0], [0, 1]]" in of_frame(transform_matrix=[[1, 0], [0, 1]])
     assert "frame number 1: found no 'file_path'" in told(lambda data: data["frames"][1].pop("file_path"))
     assert "expected lenses without k4; found 0.5" in of_frame(k4=0.5)
-    assert "expected a camera_model of OPENCV, " in told(lambda data: data.update(camera_model="EQUIRECTANGULAR"))
+    assert "expected a camera_model of OPENCV, " in told(lambda data: data.update(camera_model="VR180_L"))
     assert "expected a mapping with a list of frames" in told(lambda data: data.pop("frames"))
     file.write_text(json.dumps({**whole, "frames": [7, *whole["frames"]]}))
     found = import_dataset("nerfstudio", file, tmp_path / "in", keep_going=True)

@@ -7,6 +7,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from small import small_recipe
+from viewsphere import Dataset, generate
+from viewsphere.check import check
 from viewsphere.errors import RecipeError
 from viewsphere.geometry.camera import project
 from viewsphere.model.sensors.rig import Rig
@@ -204,3 +207,43 @@ def test_a_fisheye_s_frustum_and_angle():
     rig = sensors(a={"fov_deg": 170, "size": [100, 100], "distortion": fisheye})
     assert abs(sensor_facts(rig)[0].fov_deg[0] - 170) < 2
     assert np.isfinite(rig_mesh(rig).vertices).all()
+
+
+MIXED = {"sensors": {"front": {}, "around": {"projection": "equirectangular", "size": [64, 32]}}}
+
+
+def kept(**changes):
+    planned = plan(small_recipe(**{"rig": MIXED, "formats": [], **changes}))
+    return [sensor.kept_channels(planned.recipe.channels) for sensor in planned.rig.sensors]
+
+
+def test_each_sensor_keeps_the_channels_that_its_lens_has():
+    """Without a list of channels, a pinhole has depth and a panorama distances along its rays."""
+    recipe = small_recipe(rig=MIXED, formats=[]).model_dump(mode="json", exclude={"channels"}, exclude_defaults=True)
+    planned = plan(Recipe.model_validate(recipe))
+    assert planned.recipe.channels == ("rgb", "depth", "depth_ray", "instances", "normals")
+    front, around = (sensor.kept_channels(planned.recipe.channels) for sensor in planned.rig.sensors)
+    assert front == planned.recipe.channels and around == ("rgb", "depth_ray", "instances", "normals")
+    again = plan(planned.recipe)
+    assert again.rig == planned.rig and again.digest == planned.digest
+    assert kept(channels=["rgb", "depth"]) == [("rgb", "depth"), ("rgb",)]
+    assert kept(channels=["depth", "instances"]) == [("depth", "instances"), ("instances",)]
+
+
+def test_a_channel_that_a_sensor_lists_and_its_lens_lacks_is_an_error():
+    for entry in ({"channels": ["rgb", "depth"]}, {"channels": ["depth"]}):
+        rig = {"sensors": {**MIXED["sensors"], "around": {**MIXED["sensors"]["around"], **entry}}}
+        with pytest.raises(RecipeError, match="channels: depth: expected a lens with z-depth; found equirectangular"):
+            kept(rig=rig, channels=["rgb", "depth"])
+    with pytest.raises(RecipeError, match="channels: depth: expected a lens with z-depth"):
+        kept(rig={"sensors": {"around": MIXED["sensors"]["around"]}}, channels=["rgb", "depth"])
+
+
+@pytest.mark.slow
+def test_a_rig_of_a_pinhole_and_a_panorama_is_proved(tmp_path):
+    recipe = small_recipe(rig=MIXED, formats=["native", "colmap"]).model_dump(mode="json", exclude_defaults=True)
+    del recipe["channels"]
+    generate(Recipe.model_validate(recipe), tmp_path / "out", workers=0)
+    dataset = Dataset(tmp_path / "out")
+    assert not check(dataset).findings
+    assert {("depth" in sample.channels, sample.sensor) for sample in dataset} == {(True, "front"), (False, "around")}

@@ -241,7 +241,7 @@ def plan(
 
         loaded = load_recipe(recipe, changes)
         planned = prepare(loaded)
-        check_formats(planned, loaded.formats, loaded.channels)
+        check_formats(planned, loaded.formats, planned.recipe.channels)
         check_sidecars(planned)
     if not json_:
         print_plan(planned)

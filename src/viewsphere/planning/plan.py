@@ -49,7 +49,7 @@ from viewsphere.planning.clips import with_clips
 from viewsphere.planning.credits import credits_of, unlicensed
 from viewsphere.planning.engine_digest import engine_options, script_digest
 from viewsphere.planning.models import categories, left_out, numbered_specs
-from viewsphere.planning.rigs import rig_of
+from viewsphere.planning.rigs import rig_of, with_distances
 from viewsphere.planning.samplers import SamplingContext, Standing, lens
 from viewsphere.planning.splits import expected, quotas
 from viewsphere.planning.tracks import tracks_digest, tracks_of
@@ -436,6 +436,7 @@ def plan(recipe: Recipe | str | PathLike[str], shot_frames: int | None = None) -
         views = poses_of(recipe.viewpoints, recipe.time, recipe.seed, recipe.folder)
         own = lens(recipe, views)
         rig = rig_of(recipe, own)
+        recipe = with_distances(recipe, rig or Rig.single(own))
         if rig is None:  # those of a rig are checked together with it
             check_lenses(recipe, Rig.single(own))
         check_fill(recipe, rig or Rig.single(own), views)

@@ -48,6 +48,8 @@ def rig_of(recipe: Recipe, lens: Intrinsics) -> Rig | None:
             rig = _listed(recipe, recipe.rig, lens)
         case RigFile():
             rig = _calibrated(recipe, recipe.rig, lens)
+    recipe = with_distances(recipe, rig)
+    rig = _by_lens(recipe, rig)
     check_lenses(recipe, rig)
     _check_disparity(recipe, rig)
     if rig.sensors[0].lidar and (recipe.camera.is_random or recipe.camera.of_viewpoints):
@@ -56,6 +58,37 @@ def rig_of(recipe: Recipe, lens: Intrinsics) -> Rig | None:
             f"{rig.sensors[0].name}: list it after a camera"
         )
     return rig
+
+
+def with_distances(recipe: Recipe, rig: Rig) -> Recipe:
+    """The recipe whose default channels fit the lenses of a rig: `depth_ray` beside `depth` if some lenses have no z-depth, and
+    in its place if none has.
+    """
+    has_depth = [sensor.intrinsics.lens.has_depth for sensor in rig.sensors if sensor.lidar is None]
+    if all(has_depth) or "channels" in recipe.model_fields_set:
+        return recipe
+    distances = ("depth", "depth_ray") if any(has_depth) else ("depth_ray",)
+    channels = dict.fromkeys(n for name in recipe.channels for n in (distances if name == "depth" else (name,)))
+    return recipe.model_copy(update={"channels": tuple(channels)})
+
+
+def _by_lens(recipe: Recipe, rig: Rig) -> Rig:
+    """The rig whose sensors without a list of channels keep those that their lenses have, if other sensors keep the rest."""
+    held = [{n for n in sensor.kept_channels(recipe.channels) if not _refused(n, sensor)} for sensor in rig.sensors]
+    some = set[str]().union(*held)
+    sensors = list[Sensor]()
+    for sensor, mine in zip(rig.sensors, held, strict=True):
+        kept = sensor.kept_channels(recipe.channels)
+        is_less = sensor.channels is None and sensor.lidar is None and mine < set(kept) <= some
+        left = tuple(name for name in kept if name in mine)
+        sensors.append(sensor.model_copy(update={"channels": left}) if is_less and left else sensor)
+    return rig.model_copy(update={"sensors": tuple(sensors)})
+
+
+def _refused(name: str, sensor: Sensor) -> bool:
+    """Return whether a sensor's lens rules out a channel."""
+    label = label_named(name)
+    return label is not None and label.refuses is not None and label.refuses(sensor.intrinsics) is not None
 
 
 def _mounted(sensors: Mapping[str, tuple[Intrinsics, Float]]) -> Rig:

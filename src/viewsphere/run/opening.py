@@ -60,7 +60,7 @@ def _check_labels(entry: FormatEntry, spec: FormatSpec, recipe: Recipe, channels
     if sensor.lidar is not None and spec.lidar:
         return
     kept = sensor.kept_channels(tuple(channels))
-    lacking = missing(needs_of(spec, entry), {*kept, *recipe.annotations})
+    lacking = missing(sensor.intrinsics.lens.channels(needs_of(spec, entry)), {*kept, *recipe.annotations})
     absent = [name for name in lacking if not is_computed(name) or (sensor.lidar is not None and name in PASSES)]
     if absent:
         raise RecipeError(_absent(entry, absent[0], kept, recipe, sensor))

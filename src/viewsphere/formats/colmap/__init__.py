@@ -1,7 +1,7 @@
 """COLMAP's sparse models, text or binary, for COLMAP, pycolmap and Gaussian splatting.
 
     <world>/images/<sensor>/<index>.png   the pictures; without <sensor> if there is one
-    <world>/sparse/0/cameras.txt          lenses: PINHOLE, OPENCV, FULL_OPENCV, OPENCV_FISHEYE
+    <world>/sparse/0/cameras.txt          lenses: all of COLMAP's models; EQUIRECTANGULAR shows all directions
     <world>/sparse/0/rigs.txt             mounts of sensors: sensor_from_rig
     <world>/sparse/0/frames.txt           rig_from_world at each instant, and the images of that instant
     <world>/sparse/0/images.txt           cam_from_world, camera, file and points of each image
@@ -242,6 +242,7 @@ FORMAT = FormatSpec(
     read_by=("pycolmap", "COLMAP", "Gaussian splatting"),
     options=_Options,
     channels=("rgb", "depth"),
+    panoramas=True,
     names_credits=False,
     refuses=_refuses,
     writer=writer,

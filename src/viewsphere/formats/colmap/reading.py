@@ -24,7 +24,7 @@ from viewsphere.formats.shared.reading.posed_pictures import (
     without_world,
 )
 from viewsphere.geometry.lenses import LensParameters, opencv_parameters
-from viewsphere.geometry.lenses.shared.colmap import NAMES, PARAMETERS, has_own_lens, own_lens
+from viewsphere.geometry.lenses.shared.programs.colmap import NAMES, PARAMETERS, own_lens
 from viewsphere.geometry.rotation import matrix_from_quaternion, transform
 from viewsphere.model.listed import ListedShot
 from viewsphere.model.model_spec import Axis
@@ -132,9 +132,9 @@ def _lens(model: str, size: tuple[int, int], values: Sequence[float]) -> Intrins
     p = dict(zip(names, values, strict=True))
     k1, k2, k3, k4, k5, k6, p1, p2 = (p.get(name, 0.0) for name in ("k1", "k2", "k3", "k4", "k5", "k6", "p1", "p2"))
     bent: LensParameters | None = None
-    if has_own_lens(model):
-        bent = own_lens(model, values)
-    elif model.endswith("FISHEYE"):
+    if own := own_lens(model, values):
+        return Intrinsics(width=size[0], height=size[1], **own._asdict())
+    if model.endswith("FISHEYE"):
         bent = opencv_parameters((k1, k2, k3, k4), is_fisheye=True)
     elif any((k1, k2, k3, k4, k5, k6, p1, p2)):
         count = 8 if any((k4, k5, k6)) else 5 if k3 else 4

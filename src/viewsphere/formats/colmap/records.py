@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewsphere.errors import UserError
-from viewsphere.geometry.lenses.shared.colmap import PARAMETERS
+from viewsphere.geometry.lenses.shared.programs.colmap import PARAMETERS
 from viewsphere.geometry.rotation import quaternion_from_matrix
 from viewsphere.model.sensors.camera import Intrinsics
 
@@ -34,7 +34,8 @@ def _lens_of(lens: Intrinsics) -> tuple[str, list[float]]:
     if lens.skew or own is None:
         found = f"{lens.skew:g}" if lens.skew else lens.lens.name
         raise UserError(f"colmap: expected cameras without skew and with a lens of COLMAP's, found {found}")
-    return own.model, [lens.fx, lens.fy, lens.cx, lens.cy, *own.parameters]
+    matrix = (lens.fx, lens.fy, lens.cx, lens.cy) if own.has_matrix else ()
+    return own.model, [*matrix, *own.parameters]
 
 
 @dataclass(frozen=True, eq=False)

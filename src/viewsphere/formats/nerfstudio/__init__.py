@@ -18,7 +18,9 @@ metres, z up. `cx` and `cy` count from the image's corner: a centred camera has 
 passes through (0.5, 0.5), in nerfstudio and instant-ngp alike; NeRF's own code uses (0, 0), half a pixel away. Loaders require
 the splits train, val and test, so a missing split repeats the world's first split.
 
-Lenses are pinholes, OpenCV's with k1 k2 p1 p2 (for nerfstudio also k3), and its fisheye. NeRF's synthetic scenes have a centred
+Lenses are pinholes, OpenCV's with k1 k2 p1 p2 (for nerfstudio also k3), and its fisheye. For nerfstudio, there are also
+EQUIRECTANGULAR, whose depth is along the ray, ORTHOPHOTO and FISHEYE624. nerfstudio scales poses but not orthographic
+pictures: train with `--auto-scale-poses False`. NeRF's synthetic scenes have a centred
 pinhole, equal in all pictures of a world. `kind: instant-ngp` calls depth `depth_path` and has `aabb_scale` 16; set it to the
 size of your scene. The file also gives the first lens for all pictures, because nerfstudio's reader of instant-ngp's files
 supports one lens. Data sets whose picture is scene-linear light (`files: {rgb: exr}`) export it as EXR for `kind: instant-ngp`,
@@ -53,6 +55,7 @@ from viewsphere.formats.shared.writing import refusals
 from viewsphere.formats.shared.writing.export_files import Coded
 from viewsphere.formats.shared.writing.pictures import light_exr, picture, suffix_of
 from viewsphere.formats.shared.writing.tree import File, Layout, Piece, Tree, functions, item
+from viewsphere.geometry.lenses.shared.programs.nerfstudio import own_model
 from viewsphere.model.channel import PICTURES, picture_of
 from viewsphere.model.fields.frozen import Frozen
 from viewsphere.model.listed import ListedShot
@@ -179,7 +182,7 @@ class _Nerfstudio(Tree):
         sections = [name for name in counts if name not in lists]
         model, _, part = sections[0].partition(" ")
         if len(sections) > 1:
-            raise UserError(f"nerfstudio: {path}: expected lenses of one kind in a world; found fisheye and others")
+            raise UserError(f"nerfstudio: {path}: expected lenses of one kind in a world; found several")
         said: dict[str, Any] = {"camera_model": model, "ply_file_path": "points.ply"}
         usual = self._rigs.usual(int(part))
         if self._kind == "instant-ngp":
@@ -215,6 +218,8 @@ FORMAT = FormatSpec(
     read_by=("nerfstudio", "instant-ngp", "NeRF", "Gaussian splatting"),
     options=_Options,
     channels=("rgb",),
+    panoramas=True,
+    parallel_rays=True,
     names_credits=False,
     needs=_needs,
     refuses=_refuses,
@@ -228,6 +233,10 @@ FORMAT = FormatSpec(
 
 def _lens_problem(lens: Intrinsics, kind: str) -> str | None:
     """Return the part of a lens that files of this kind cannot express; None for a lens that they can."""
+    if lens.skew:
+        return f"expected cameras without skew; found {lens.skew:g}"
+    if kind == "nerfstudio" and own_model(lens):
+        return None
     if lens.lens.opencv is None:
         return f"expected lenses of OpenCV's models; found {lens.lens.name}"
     own = lens.lens.opencv.coefficients
@@ -235,8 +244,6 @@ def _lens_problem(lens: Intrinsics, kind: str) -> str | None:
         return f"expected pinhole cameras; found {len(own)} coefficients"
     if any(own[MOST[kind] :]):
         return f"expected lenses of at most {MOST[kind]} coefficients; found {len(own)}"
-    if lens.skew:
-        return f"expected cameras without skew; found {lens.skew:g}"
     if kind == SYNTHETIC and (lens.fx, lens.cx, lens.cy) != (lens.fy, lens.width / 2, lens.height / 2):
         found = f"fx {lens.fx:g}, fy {lens.fy:g}, cx {lens.cx:g}, cy {lens.cy:g}"
         return f"expected square pixels and a centred principal point; found {found}"
@@ -245,14 +252,17 @@ def _lens_problem(lens: Intrinsics, kind: str) -> str | None:
 
 def _model_of(lens: Intrinsics) -> str:
     """The name of a lens' model."""
-    own = lens.lens.opencv
-    return "OPENCV_FISHEYE" if own and own.is_fisheye else "OPENCV"
+    if own := own_model(lens):
+        return own[0]
+    return "OPENCV_FISHEYE" if lens.lens.opencv and lens.lens.opencv.is_fisheye else "OPENCV"
 
 
 def _said_of(lens: Intrinsics, kind: str) -> dict[str, Any]:
     """A lens' numbers by their names: sizes and K in pixels from the corner, and coefficients."""
     said: dict[str, Any] = {"w": lens.width, "h": lens.height, "fl_x": lens.fx, "fl_y": lens.fy, "cx": lens.cx, "cy": lens.cy}
-    if own := lens.lens.opencv:
+    if model := own_model(lens):
+        said |= model[1]
+    elif own := lens.lens.opencv:
         said |= dict(zip(FISHEYE if own.is_fisheye else STANDARD, own.coefficients[: MOST[kind]], strict=False))
         if kind == "instant-ngp" and own.is_fisheye:
             said["is_fisheye"] = True

@@ -23,12 +23,13 @@ from viewsphere.formats.shared.reading.posed_pictures import (
     without_world,
 )
 from viewsphere.geometry.lenses import LensParameters, opencv_parameters
+from viewsphere.geometry.lenses.shared.programs.nerfstudio import OWN, own_lens
 from viewsphere.model.sensors.camera import Intrinsics
 from viewsphere.store.foreign import ForeignDataset
 from viewsphere.store.paths import file_inside, is_name
 from viewsphere.store.texts import parsed
 
-MODELS = ("OPENCV", "OPENCV_FISHEYE", "PINHOLE", "SIMPLE_PINHOLE")
+MODELS = ("OPENCV", "OPENCV_FISHEYE", "PINHOLE", "SIMPLE_PINHOLE", *OWN)
 
 
 def read(path: Path, *, keep_going: bool = False) -> ForeignDataset:
@@ -163,6 +164,10 @@ def lens_of(said: Mapping[str, Any], size: tuple[int, int]) -> Intrinsics:
     model = "OPENCV_FISHEYE" if said.get("is_fisheye") else said.get("camera_model", "OPENCV")
     if model not in MODELS:
         raise ValueError(f"expected a camera_model of {', '.join(MODELS)}; found {model!r:.60}")
+    size_of = {"width": width, "height": height}
+    fy = _number(said, "fl_y", 0.0) or fx
+    if model in OWN:
+        return Intrinsics(**size_of, **own_lens(model, (fx, fy, cx, cy), said.get("distortion_params") or ())._asdict())
     k1, k2, k3, k4, p1, p2 = (_number(said, name, 0.0) for name in ("k1", "k2", "k3", "k4", "p1", "p2"))
     bent: LensParameters | None = None
     if model == "OPENCV_FISHEYE":
@@ -171,5 +176,4 @@ def lens_of(said: Mapping[str, Any], size: tuple[int, int]) -> Intrinsics:
         raise ValueError(f"expected lenses without k4; found {k4:g}: undistort the pictures first")
     elif any((k1, k2, k3, p1, p2)):
         bent = opencv_parameters((k1, k2, p1, p2, k3) if k3 else (k1, k2, p1, p2))
-    size_of = {"width": width, "height": height}
-    return Intrinsics(**size_of, fx=fx, fy=_number(said, "fl_y", 0.0) or fx, cx=cx, cy=cy, distortion=bent)
+    return Intrinsics(**size_of, fx=fx, fy=fy, cx=cx, cy=cy, distortion=bent)

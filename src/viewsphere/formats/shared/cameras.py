@@ -110,12 +110,13 @@ class Rigs:
 
 
 def measured_png(sample: Sample, metres: float) -> Coded:
-    """Depth along z in steps of this many metres, 16 bits, as in RGB-D cameras: 0 for no surface or a depth beyond the
-    range.
+    """Depth along z, of panoramas along the ray, in steps of this many metres, 16 bits, as in RGB-D cameras: 0 for no surface
+    or a depth beyond the range.
     """
 
     def make() -> bytes:
-        depth = sample.channels["depth"].astype(np.float64)
+        (name,) = sample.camera.lens.channels(("depth",))
+        depth = sample.channels[name].astype(np.float64)
         with np.errstate(invalid="ignore"):
             steps = np.rint(depth / metres)
         held = (depth > 0) & (steps <= MOST)
@@ -134,13 +135,16 @@ class _Points:
 
 
 def points_of(sample: Sample) -> _Points:
-    """The points that pixels of a coarse grid show, by the channel `depth`."""
+    """The points that pixels of a coarse grid show, by the channel `depth`, or `depth_ray` of panoramas."""
     camera = sample.camera
+    (name,) = camera.lens.channels(("depth",))
     step = max(1, math.ceil(math.sqrt(camera.width * camera.height / POINTS)))
     rows, columns = np.mgrid[step // 2 : camera.height : step, step // 2 : camera.width : step]
-    depth, rays = sample.channels["depth"][rows, columns].astype(np.float64), pixel_rays(camera.intrinsics)[rows, columns]
-    seen = np.isfinite(depth) & np.isfinite(rays).all(axis=-1) & (rays[..., 2] * depth > 0)
-    rows, columns, rays, depth = rows[seen], columns[seen], rays[seen], depth[seen]
-    places = rays * (depth / rays[:, 2])[:, None]
+    rays, begin = pixel_rays(camera.intrinsics)[rows, columns], camera.lens.origins()[rows, columns]
+    along = rays[..., 2] if camera.lens.has_depth else np.ones(rays.shape[:-1])
+    depth = sample.channels[name][rows, columns].astype(np.float64)
+    seen = np.isfinite(depth) & np.isfinite(rays).all(axis=-1) & (along * depth > 0)
+    rows, columns, rays, depth, along = rows[seen], columns[seen], rays[seen], depth[seen], along[seen]
+    places = begin[seen] + rays * (depth / along)[:, None]
     pixels = np.column_stack((columns, rows)) + 0.5
     return _Points(pixels, transform(camera.R.T, places - camera.t), shown_picture(sample)[rows, columns, :3])

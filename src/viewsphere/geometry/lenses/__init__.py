@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import importlib
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
@@ -117,10 +117,11 @@ class OpenCVLens(NamedTuple):
 
 
 class ColmapLens(NamedTuple):
-    """A lens in COLMAP's terms: a camera model whose parameters are fx, fy, cx, cy and then these."""
+    """A lens in COLMAP's terms: a camera model whose parameters are fx, fy, cx, cy, if it `has_matrix`, and then these."""
 
     model: str
     parameters: tuple[float, ...]
+    has_matrix: bool = True
 
 
 class LensSpec(BaseModel):
@@ -263,6 +264,10 @@ class Lens:
     def has_depth(self) -> bool:
         """Return whether z-depth is defined."""
         return self.spec.has_depth
+
+    def channels(self, names: Iterable[str]) -> tuple[str, ...]:
+        """Names of channels, with `depth_ray` instead of `depth` where z-depth is not defined."""
+        return tuple("depth_ray" if name == "depth" and not self.has_depth else name for name in names)
 
     @cached_property
     def period(self) -> int | None:

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import math
-from typing import Literal
+from typing import Any, Literal
 
 from pydantic import Field
 
-from viewsphere.geometry.lenses import Calibration, LensOptions, LensParameters, LensSpec
+from viewsphere.geometry.lenses import Calibration, ColmapLens, LensOptions, LensParameters, LensSpec
 from viewsphere.geometry.lenses.shared import panorama
 from viewsphere.geometry.lenses.shared.panorama import Span, SpanField
 
@@ -43,6 +43,19 @@ def _calibrate(options: Options, size: tuple[int, int]) -> Calibration:
     return Calibration(width / math.radians(across), height / math.radians(down), width / 2, height / 2, Equirectangular())
 
 
+def _as_colmap(lens: Any) -> ColmapLens | None:
+    """The picture of all directions; COLMAP has no smaller span."""
+    i = lens.intrinsics
+    missed = abs(math.pi * i.fy - i.height), abs(i.cx - i.width / 2), abs(i.cy - i.height / 2), abs(i.skew)
+    if lens.period is None or max(missed) > panorama.CLOSED:
+        return None
+    return ColmapLens("EQUIRECTANGULAR", (float(i.width), float(i.height)), has_matrix=False)
+
+
 LENS = LensSpec(
-    parameters=Equirectangular, options=Options, calibrate=_calibrate, **panorama.panorama_functions(LIMIT, is_cylinder=False)
+    parameters=Equirectangular,
+    options=Options,
+    calibrate=_calibrate,
+    as_colmap=_as_colmap,
+    **panorama.panorama_functions(LIMIT, is_cylinder=False),
 )

@@ -11,7 +11,7 @@ from viewsphere import files
 from viewsphere.assets.paths.folder import ModelFolder
 from viewsphere.assets.readers.shared.xml_tree import parse_xml
 from viewsphere.errors import ModelError, RecipeError
-from viewsphere.geometry.lenses.shared.colmap import NAMES, PARAMETERS
+from viewsphere.geometry.lenses.shared.programs.colmap import NAMES, PARAMETERS
 from viewsphere.validation.errors import shown
 
 

@@ -37,7 +37,8 @@ def lacking(dataset: Dataset, spec: FormatSpec, entry: FormatEntry) -> tuple[str
             unknown |= dict.fromkeys(missing(wanted, {*part.channels, *asked}))
             continue
         for sensor in shot.rig.sensors:
-            absent = missing(wanted, {*sensor.kept_channels(part.channels), *asked})
+            needed = sensor.intrinsics.lens.channels(wanted)
+            absent = missing(needed, {*sensor.kept_channels(part.channels), *asked})
             names |= dict.fromkeys(name for name in absent if sensor.lidar is None or name not in PASSES)
     painted = [name for name in names if name in PASSES and name not in dataset.plan.channels]
     where = f"{dataset.root}: format {entry.name}"

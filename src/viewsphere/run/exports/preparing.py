@@ -132,8 +132,10 @@ class Target:
         every frame.
         """
         shown = self.view.shown(sample)
-        absent = missing(self.spec.channels or (), {*shown.channels, *shown.requested})
-        is_exempt = self.spec.lidar and sample.known_camera is not None and sample.camera.lens.is_scan
+        lens = None if sample.known_camera is None else sample.known_camera.lens
+        needed = self.spec.channels or ()
+        absent = missing(lens.channels(needed) if lens else needed, {*shown.channels, *shown.requested})
+        is_exempt = self.spec.lidar and lens is not None and lens.is_scan
         if sample.sensor != CAMERA and absent and not is_exempt:
             raise UserError(
                 f"expected channel {absent[0]} of every frame, found none of sensor {sample.sensor} (frame {sample.index}): "

@@ -74,4 +74,5 @@ def _is_used(channel: str, formats: Iterable[FormatEntry]) -> bool:
     channels.
     """
     specs = ((plugins.load(FormatSpec, entry.name), entry) for entry in formats)
-    return channel in PICTURES or any(spec.channels is None or channel in needs_of(spec, entry) for spec, entry in specs)
+    names = {channel, "depth"} if channel == "depth_ray" else {channel}  # which takes the place of depth in panoramas
+    return channel in PICTURES or any(spec.channels is None or names & {*needs_of(spec, entry)} for spec, entry in specs)

@@ -21,7 +21,7 @@ from viewsphere.composing.viewpoints.pose_files.lines import (
 from viewsphere.composing.viewpoints.pose_files.motions import from_quaternion, motion
 from viewsphere.errors import RecipeError
 from viewsphere.geometry.lenses import LensParameters, opencv_parameters
-from viewsphere.geometry.lenses.shared.colmap import PARAMETERS, has_own_lens, own_lens
+from viewsphere.geometry.lenses.shared.programs.colmap import PARAMETERS, own_lens
 from viewsphere.geometry.rotation import transform
 from viewsphere.model.sensors.camera import Intrinsics
 from viewsphere.validation.errors import told_of
@@ -71,18 +71,18 @@ def _camera(words: Sequence[str], where: str) -> Intrinsics:
     names = PARAMETERS[model][1].split()
     width, height = picture_size(words[2], words[3], where)
     p = dict(zip(names, counted(words[4:], len(names), where), strict=True))
-    fx = p.get("fx", p.get("f", 0.0))
+    fx = p.get("fx", p.get("f", p.get("w", 0.0)))
     if fx <= 0:
         raise RecipeError(f"{where}: expected a focal length above 0; found {fx:g}")
     with told_of(where):
+        if own := own_lens(model, tuple(p.values())):
+            return Intrinsics(width=width, height=height, **own._asdict())
         return Intrinsics(
             width=width, height=height, fx=fx, fy=p.get("fy", fx), cx=p["cx"], cy=p["cy"], distortion=_distortion(model, p)
         )
 
 
 def _distortion(model: str, p: dict[str, float]) -> LensParameters | None:
-    if has_own_lens(model):
-        return own_lens(model, tuple(p.values()))
     k1, k2, k3, k4, k5, k6, p1, p2 = (p.get(n, 0.0) for n in ("k1", "k2", "k3", "k4", "k5", "k6", "p1", "p2"))
     if model.endswith("FISHEYE"):
         return opencv_parameters((k1, k2, k3, k4), is_fisheye=True)

@@ -15,13 +15,14 @@ from viewsphere.composing.viewpoints.pose_files.lines import number, read_text
 from viewsphere.composing.viewpoints.pose_files.motions import motion
 from viewsphere.errors import RecipeError
 from viewsphere.geometry.lenses import LensParameters, focal_from_fov, opencv_parameters
+from viewsphere.geometry.lenses.shared.programs.nerfstudio import OWN, own_lens
 from viewsphere.model.sensors.camera import Intrinsics
 from viewsphere.store.texts import parsed
 from viewsphere.validation.errors import told_of
 
 NUMBERS = ("w", "h", "fl_x", "fl_y", "cx", "cy", "k1", "k2", "k3", "k4", "p1", "p2", "camera_angle_x")
-LENS_KEYS = (*NUMBERS, "camera_model", "is_fisheye")
-MODELS = ("OPENCV", "OPENCV_FISHEYE", "PINHOLE", "SIMPLE_PINHOLE")
+LENS_KEYS = (*NUMBERS, "camera_model", "is_fisheye", "distortion_params")
+MODELS = ("OPENCV", "OPENCV_FISHEYE", "PINHOLE", "SIMPLE_PINHOLE", *OWN)
 
 
 def read_nerfstudio(path: Path) -> PoseFile:
@@ -67,16 +68,14 @@ def _lens(given: Mapping[str, Any], where: str) -> Intrinsics | None:
     fx = values.get("fl_x") or (focal_from_fov(angle, values["w"]) if angle and 0 < angle < math.pi else None)
     if fx is None or fx <= 0 or values["w"] < 1 or values["h"] < 1:
         raise RecipeError(f"{where}: expected w, h and fl_x (or camera_angle_x) above 0; found {fx}")
+    size = {"width": int(values["w"]), "height": int(values["h"])}
+    matrix = (fx, values.get("fl_y") or fx, values.get("cx", values["w"] / 2), values.get("cy", values["h"] / 2))
+    model = "OPENCV_FISHEYE" if given["is_fisheye"] else given["camera_model"]
     with told_of(where):
-        return Intrinsics(
-            width=int(values["w"]),
-            height=int(values["h"]),
-            fx=fx,
-            fy=values.get("fl_y") or fx,
-            cx=values.get("cx", values["w"] / 2),
-            cy=values.get("cy", values["h"] / 2),
-            distortion=_distortion("OPENCV_FISHEYE" if given["is_fisheye"] else given["camera_model"], values, where),
-        )
+        if model in OWN:
+            return Intrinsics(**size, **own_lens(model, matrix, given["distortion_params"] or ())._asdict())
+        bent = _distortion(model, values, where)
+        return Intrinsics(**size, fx=matrix[0], fy=matrix[1], cx=matrix[2], cy=matrix[3], distortion=bent)
 
 
 def _distortion(model: object, values: Mapping[str, float], where: str) -> LensParameters | None:

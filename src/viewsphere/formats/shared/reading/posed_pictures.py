@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from viewsphere.codecs.png_tiff import decode_png, encode_png
+from viewsphere.codecs.png_tiff import decode_png, encode_png, encode_tiff
 from viewsphere.codecs.size import opened
 from viewsphere.errors import StoreError, UserError
 from viewsphere.files import read_bytes
@@ -31,8 +31,8 @@ MOST = 1e9
 
 @dataclass(frozen=True)
 class Posed:
-    """A picture's file, its camera, and its place in the data set; and its depth: a 16-bit file along z in steps of this many
-    metres, 0 if unknown.
+    """A picture's file, its camera, and its place in the data set; and its depth: a 16-bit file along z, of panoramas along the
+    ray, in steps of this many metres, 0 if unknown.
     """
 
     file: Path
@@ -44,6 +44,12 @@ class Posed:
     time: float = 0.0
     depth: Path | None = None
     step: float = 0.001
+
+    @property
+    def distance(self) -> str:
+        """The channel of its depth."""
+        (name,) = self.camera.lens.channels(("depth",))
+        return name
 
 
 def without_world(path: Path, expected: str, *patterns: str) -> StoreError:
@@ -101,7 +107,7 @@ def posed_dataset(
         digest=digest.hexdigest(),
         categories=(),
         splits=tuple(dict.fromkeys(one.split for one in found)),
-        channels=("rgb", "depth") if all(one.depth for one in found) else ("rgb",),
+        channels=("rgb", *dict.fromkeys(one.distance for one in found)) if all(one.depth for one in found) else ("rgb",),
         count=len(found),
         poses=len(found),
         max_objects=1,
@@ -116,12 +122,12 @@ def _frames(found: Sequence[Posed]) -> Iterator[ForeignFrame]:
         pose = viewpoint_of(world_from_camera(one.camera), (0.0, 0.0, 0.0), index)
         sample = Sample(index, one.split, one.camera, pose, (), {}, {})
         sample = replace(sample, sequence=one.sequence, sensor=one.sensor, instant=one.instant, time=one.time)
-        depth = {"depth": _depth(one.depth, one)} if has_depth and one.depth else {}
+        depth = {one.distance: _depth(one.depth, one)} if has_depth and one.depth else {}
         yield ForeignFrame(sample, {"rgb": one.file, **depth})
 
 
 def _depth(file: Path, one: Posed) -> Loaded:
-    """A depth map with its step, like stored ones."""
+    """A depth map like stored ones: z-depth with its step, distances along rays in metres."""
     try:
         steps = decode_png(read_bytes(file, "MAX_PICTURE_BYTES"))
     except (OSError, UserError) as error:
@@ -129,4 +135,6 @@ def _depth(file: Path, one: Posed) -> Loaded:
     size = (one.camera.height, one.camera.width)
     if steps.shape != size or steps.dtype != np.uint16:
         raise StoreError(f"{file}: expected depth of 16 bits, {size[1]} x {size[0]}; found {steps.dtype} {steps.shape}")
-    return Loaded(".png", encode_png(steps, unit=one.step))
+    if one.camera.lens.has_depth:
+        return Loaded(".png", encode_png(steps, unit=one.step))
+    return Loaded(".tiff", encode_tiff(np.where(steps > 0, steps * one.step, np.inf).astype(np.float32)))

@@ -5,9 +5,10 @@ Source: https://colmap.github.io/cameras.html, and the numbers of the models in 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 
-from viewsphere.geometry.lenses import LensParameters, lens_parameters
+from viewsphere.geometry.lenses import Calibration, LensParameters, lens_parameters
 
 PARAMETERS = {
     "SIMPLE_PINHOLE": (0, "f cx cy"),
@@ -27,8 +28,12 @@ PARAMETERS = {
     "SIMPLE_FISHEYE": (14, "f cx cy"),
     "FISHEYE": (15, "fx fy cx cy"),
     "EUCM": (16, "fx fy cx cy alpha beta"),
+    "EQUIRECTANGULAR": (17, "w h"),
 }
-"""Number in binary files and parameters of each model, except EQUIRECTANGULAR."""
+"""Number in binary files and parameters of each model."""
+
+PANORAMA = "EQUIRECTANGULAR"
+"""The model without focal lengths: it shows all directions in a picture of w x h pixels."""
 
 NAMES = {number: name for name, (number, _) in PARAMETERS.items()}
 
@@ -61,12 +66,15 @@ _LENSES: dict[str, Callable[[Sequence[float]], LensParameters]] = {
 }
 
 
-def has_own_lens(model: str) -> bool:
-    """Return whether a model is not one of OpenCV's."""
-    return model in _LENSES
-
-
-def own_lens(model: str, values: Sequence[float]) -> LensParameters:
-    """The lens of a model that `has_own_lens`, from its parameters in COLMAP's order. Raises ValueError for invalid values."""
-    matrix = 4 if PARAMETERS[model][1].startswith("fx") else 3
-    return _LENSES[model](values[matrix:])
+def own_lens(model: str, values: Sequence[float]) -> Calibration | None:
+    """The lens of a model that is not one of OpenCV's, from its parameters in COLMAP's order; None for other models. Raises
+    ValueError for invalid values.
+    """
+    if model not in _LENSES and model != PANORAMA:
+        return None
+    if model == PANORAMA:
+        width, height = values
+        return Calibration(width / math.tau, height / math.pi, width / 2, height / 2, lens_parameters("equirectangular"))
+    focal, *rest = values
+    fx, (fy, cx, cy, *more) = focal, rest if PARAMETERS[model][1].startswith("fx") else (focal, *rest)
+    return Calibration(fx, fy, cx, cy, _LENSES[model](more))

@@ -1,0 +1,1 @@
+"""Camera models of other programs, in terms of the lenses here."""
