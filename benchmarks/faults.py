@@ -2,8 +2,9 @@
 
     benchmarks/faults [--share 1.0] [--seed 1]    # some 140 faults: half an hour on two cores
     benchmarks/faults --cost                      # frames a second with --durability fsync, as a share of those without
+    benchmarks/faults --cache 400                 # so many kills of processes that fill one cache: five minutes
 
-What a fault may not do is in tests/faults.py, which the tests share. Status 1 where it did.
+What a fault may not do is in tests/faults.py and tests/cache_kills.py, which the tests share. Status 1 where it did.
 """
 
 from __future__ import annotations
@@ -21,7 +22,8 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT / "tests"))
 
-from faults import SIGNALS, WORKS, Course, Tally, make_stock, recipe  # noqa: E402, which is found now
+import cache_kills  # noqa: E402, which is found now
+from faults import SIGNALS, WORKS, Course, Tally, make_stock, recipe  # noqa: E402
 
 PAGE = ROOT / "docs" / "reliability.md"
 TABLE = re.compile(r"(<!-- written by benchmarks/faults -->\n).*?(\n<!-- end -->)", re.DOTALL)
@@ -96,13 +98,28 @@ def cost(turns: int = 5) -> None:
     )
 
 
+def kill_writers(kills: int, seed: int) -> bool:
+    """Kill so many processes that fill one cache, print the findings, and return whether they are as expected."""
+    from viewsphere.kernels.entries import kernel_folder
+
+    kernels = kernel_folder()
+    with tempfile.TemporaryDirectory(prefix="viewsphere-faults-") as place:
+        os.environ |= {"VIEWSPHERE_CACHE": str(Path(place, "cache")), "VIEWSPHERE_CACHE_LIMIT": str(cache_kills.LIMIT)}
+        findings = cache_kills.campaign(Path(place, "stock"), kernels, kills, seed, longest=2.0)
+    print(findings)
+    return findings.is_good
+
+
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--share", type=float, default=1.0, help="of the faults")
     parser.add_argument("--seed", type=int, default=1, help="of the moments")
     parser.add_argument("--cost", action="store_true", help="measure what durability costs instead")
+    parser.add_argument("--cache", type=int, metavar="KILLS", help="kill so many processes that fill one cache instead")
     options = parser.parse_args()
     if options.cost:
         cost()
+    elif options.cache:
+        sys.exit(0 if kill_writers(options.cache, options.seed) else 1)
     else:
         sys.exit(0 if campaign(options.share, options.seed) else 1)

@@ -61,6 +61,11 @@ def test_a_second_load_is_equal_and_reads_nothing(spec, counted, tmp_path):
     assert any("lost.png" in warning for warning in first.warnings)
 
 
+def test_facts_list_the_same_files_with_and_without_an_entry(spec, tmp_path):
+    first, second = (cache.load(spec, tmp_path / "cache")[1] for _ in range(2))
+    assert first.files == second.files and spec.source in map(str, first.files)
+
+
 @pytest.mark.parametrize(
     ("name", "content"),
     [

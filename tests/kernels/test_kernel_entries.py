@@ -13,7 +13,9 @@ from pathlib import Path
 
 import pytest
 
+from viewsphere.caches.entries import PREFIX, sweep_once
 from viewsphere.kernels import entries
+from viewsphere.scratch import of_this_process
 
 NAME = "0123/kernels_a.b-4567.kernel"
 posix = pytest.mark.skipif(os.name != "posix", reason="owners and modes are POSIX's")
@@ -112,7 +114,7 @@ def test_links_and_pipes_are_not_followed(root, tmp_path):
 
 
 def test_a_full_disk_costs_only_time(root, monkeypatch, tmp_path):
-    def full(file, data):
+    def full(*_):
         raise OSError(errno.ENOSPC, "full")
 
     monkeypatch.setattr(entries, "_write", full)
@@ -155,14 +157,27 @@ def test_many_may_write_one_entry(root):
 
 
 def test_what_killed_processes_left_goes(root):
+    dead = subprocess.Popen([sys.executable, "-c", ""])
+    dead.wait()
+    half = root / f"{PREFIX}{of_this_process().replace(f'~{os.getpid()}~', f'~{dead.pid}~')}abc"
+    half.mkdir(mode=0o700, parents=True)
+    for name in ("lock", Path(NAME).name):
+        (half / name).touch()
+    sweep_once.cache_clear()
     entries.save(NAME, b"code")
-    half = root / "0123" / ".a.kernel.abcd"
-    half.touch()
-    os.utime(half, (1, 1))
-    fresh = half.with_name(".b.kernel.abcd")
-    fresh.touch()
-    entries.save("89ab/c.kernel", b"more")
-    assert not half.exists() and fresh.exists()
+    assert entries.load(NAME) == b"code"
+    assert not half.exists()
+
+
+def test_kernels_count_for_the_limit_of_the_cache(root, monkeypatch, tmp_path):
+    monkeypatch.setenv("VIEWSPHERE_CACHE_LIMIT", "100kB")
+    for number in range(40):
+        entries.save(f"0123/{number}.kernel", os.urandom(5_000))
+    assert sum(file.stat().st_size for file in root.rglob("*.kernel")) <= 100_000
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "elsewhere"))
+    for number in range(40):
+        entries.save(f"0123/{number}.kernel", os.urandom(5_000))
+    assert len(list((tmp_path / "elsewhere").rglob("*.kernel"))) == 40
 
 
 USE = """

@@ -4,9 +4,11 @@ import pytest
 
 from scratch import scratch_cache
 from small import small_recipe, tree_hash
+from viewsphere.assets.exporting import export
 from viewsphere.caches import budget
 from viewsphere.engines.raster.indirect import bounces
 from viewsphere.run.generate import generate
+from viewsphere.run.shots import models
 
 SKY = {"daylight": {"turbidity": 2.5}}
 ROOM = {
@@ -18,6 +20,30 @@ ROOM = {
     "channels": ["rgb", "depth", "instances"],
     "formats": ["native"],
 }
+
+
+PERSON = {"source": "zoo:person", "category": "person", "scale": {"length": 0.3}, "frames": [1, 5]}
+
+
+@pytest.mark.parametrize("is_moving", [False, True])
+def test_exports_of_models_are_written_once_and_equal(is_moving, tmp_path, monkeypatch):
+    scratch_cache(monkeypatch, tmp_path / "cache")
+    written, write, changes = [], models.export_obj, {"models": [PERSON]} if is_moving else {}
+    for module in (models, export):
+        monkeypatch.setattr(module, "export_obj", lambda *given: written.append(given) or write(*given))
+
+    def made(name):
+        written.clear()
+        recipe = small_recipe(viewpoints={"azimuth": [0], "elevation": [15], "distance": 1.0}, **changes)
+        generate(recipe, tmp_path / name, workers=0)
+        return tree_hash(tmp_path / name), len(written)
+
+    cold, count = made("cold")
+    assert count == (3 if is_moving else 2)  # the poses of both frames and at rest, or two models
+    assert made("warm") == (cold, 0)
+    monkeypatch.setenv("VIEWSPHERE_CACHE", str(tmp_path / "a file"))
+    (tmp_path / "a file").touch()
+    assert made("without") == (cold, count)
 
 
 @pytest.fixture
@@ -43,9 +69,9 @@ def test_the_cache_changes_no_byte(rendered, tmp_path, monkeypatch):
     cold, times = rendered("cold")
     assert times >= 1  # one more where kernels are compiled first, for which a tiny scene is baked
     kinds = {entry.kind for entry in budget.entries()}
-    assert kinds >= {"light", "zoo"}
+    assert kinds >= {"exports", "light", "zoo"}
     assert rendered("warm") == (cold, 0)
-    for entry in budget.entries(("light", "zoo")):
+    for entry in budget.entries(("exports", "light", "zoo")):
         whole = bytearray(entry.file.read_bytes())
         whole[len(whole) // 2] ^= 4
         entry.file.write_bytes(whole)

@@ -5,7 +5,7 @@ import pytest
 
 import viewsphere_zoo as zoo
 from quick import quick
-from viewsphere.assets.cache import load, part_points
+from viewsphere.assets.cache import _part_points, load
 from viewsphere.assets.mesh import Mesh
 from viewsphere.assets.metadata.model_metadata import metadata_of
 from viewsphere.model.annotations.keypoints import At, sided
@@ -102,9 +102,9 @@ def test_places_in_boxes_around_parts():
         "top": At("seat", (0, 0, 1)),
         "none": At("roof"),
     }
-    found = part_points(mesh, places, [("middle", "lamp_left"), ("middle", "none")])
+    found = _part_points(mesh, places, [("middle", "lamp_left"), ("middle", "none")])
     assert found.points == {
         "middle": (1, 2, 3), "corner_left": (2, 0, 0), "corner_right": (0, 0, 0), "lamp_left": (8.5, 9, 8.5), "top": (1, 2, 6),
     }  # fmt: skip
     assert found.skeleton == (("middle", "lamp_left"),) and found.flips == (("corner_left", "corner_right"),)
-    assert part_points(mesh, {"none": At("roof")}) is None
+    assert _part_points(mesh, {"none": At("roof")}) is None

@@ -96,7 +96,7 @@ def load(
     with _aside(folder) as place:
         (file,), named = read_apart(spec, () if frame is None else (frame,), place)
         mesh, facts = read_mesh(file, path)
-        facts = replace(facts, files=tuple(named))
+        facts = replace(facts, files=_located(path, _names(path, named)))  # as the cache has them
         if first is not None:
             _store(folder, first, path, named, file)
     return mesh, facts
@@ -187,7 +187,7 @@ def _built(spec: ModelSpec, named: Named) -> Mesh | Path:
 
 def _facts(spec: ModelSpec, named: Named, mesh: Mesh) -> FileFacts:
     family = family_of(spec.source)
-    points = None if family is None else part_points(mesh, family.keypoints, family.skeleton)
+    points = None if family is None else _part_points(mesh, family.keypoints, family.skeleton)
     return FileFacts(Path(spec.source), named.prefix, "+z", "-y", 1.0, size=extents(mesh), keypoints=points)
 
 
@@ -254,7 +254,7 @@ def _stored(folder: Path, first: str, path: Path) -> tuple[Mesh, FileFacts] | No
         if names is None or held is None:
             return None
         mesh, facts = unpacked(held, path)
-        return mesh, replace(facts, files=tuple(path.parent / name for name in names.about))
+        return mesh, replace(facts, files=_located(path, names.about))
     except Exception:  # an entry with any problem is rebuilt
         return None
 
@@ -267,6 +267,11 @@ def _names(path: Path, files: Iterable[Path]) -> list[str]:
     """Paths of files that a model depends on, relative to its own folder."""
     root = os.path.realpath(path.parent)
     return sorted({_from(root, os.path.realpath(file)).replace(os.sep, "/") for file in files})
+
+
+def _located(path: Path, names: Iterable[str]) -> tuple[Path, ...]:
+    """The files of these names beside a model."""
+    return tuple(path.parent / name for name in names)
 
 
 def _from(root: str, file: str) -> str:
@@ -284,7 +289,7 @@ def _store(folder: Path, first: str, path: Path, files: Iterable[Path], mesh: Pa
         write_entry(_named(folder, first), names, {})
 
 
-def part_points(mesh: Mesh, places: Mapping[str, At], skeleton: Sequence[Pair] = ()) -> Keypoints | None:
+def _part_points(mesh: Mesh, places: Mapping[str, At], skeleton: Sequence[Pair] = ()) -> Keypoints | None:
     """The points of a mesh, in its axes, for the parts that it has, and the lines between them; None without any."""
     found = {name: place for name, at in places.items() if (place := _place(mesh, at)) is not None}
     if not found:

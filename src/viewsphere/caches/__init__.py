@@ -1,6 +1,7 @@
 """Reproducible results that viewsphere caches: one folder with one size limit, addressed by content.
 
     <cache>/<kind>/<digest>.arrays    an entry of `arrays`: JSON and numpy arrays, checked by a digest, mapped into memory
+    <cache>/<kind>/<digest>.file      a file of an entry of `folders`
     <cache>/<kind>/...                other files of a kind, such as compiled kernels
     <cache>/written                   how much was written since the budget was last checked, see `budget`
 
@@ -16,6 +17,7 @@ from pathlib import Path
 import platformdirs
 
 KINDS: Mapping[str, str] = {
+    "exports": "models as data sets have them, OBJ and GLB",
     "kernels": "compiled kernels",
     "light": "baked light",
     "models": "model files as they were read",

@@ -37,6 +37,9 @@ KERNELS, KERNELS_S = "kernels", 30 * 86_400.0
 workers read them again hours after a run has begun.
 """
 
+EXPORTS = "exports"
+"""The kind that is deleted first: the exports of a run's models may be larger than the cache, and each saves least time."""
+
 READ_BY_PATH = frozenset({".glb"})
 """Endings of files that others open by their path, so that pruning spares the ones in use."""
 
@@ -59,7 +62,7 @@ def entries(kinds: Iterable[str] = tuple(KINDS)) -> Iterator[Entry]:
     for kind in kinds:
         for folder, folders, names in os.walk(cache_of(kind)):
             folders[:] = (name for name in folders if "~" not in name)  # without the scratch folders of unfinished entries
-            for name in (name for name in names if not name.startswith(".")):
+            for name in names:
                 file = Path(folder, name)
                 with suppress(OSError):  # deleted meanwhile
                     about = file.lstat()
@@ -119,9 +122,7 @@ def prune(limit: int) -> list[Entry]:
     """
     _sweep_all()
     now = time.time() + 60  # machines that share a cache differ by some seconds
-    newest_first = sorted(
-        entries(), key=lambda entry: (_is_deleted_first(entry, now), entry.used > now, -entry.used, str(entry.file))
-    )
+    newest_first = sorted(entries(), key=lambda entry: (_rank(entry, now), entry.used > now, -entry.used, str(entry.file)))
     sums = accumulate(entry.size for entry in newest_first)
     return _delete(
         entry for entry, total in zip(newest_first, sums, strict=True) if total > limit and not _is_in_use(entry, now)
@@ -137,8 +138,13 @@ def _is_in_use(entry: Entry, now: float) -> bool:
     return entry.file.suffix in READ_BY_PATH and now - SPARED_S < entry.used <= now
 
 
-def _is_deleted_first(entry: Entry, now: float) -> bool:
-    return entry.kind != KERNELS or entry.used < now - KERNELS_S
+def _rank(entry: Entry, now: float) -> int:
+    """The higher, the earlier an entry is deleted."""
+    if _is_in_use(entry, now):
+        return 0  # others make room for it
+    if entry.kind == KERNELS and entry.used >= now - KERNELS_S:
+        return 1
+    return 3 if entry.kind == EXPORTS else 2
 
 
 def clear(kinds: Iterable[str] = tuple(KINDS)) -> list[Entry]:

@@ -14,7 +14,7 @@ from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from viewsphere.caches import budget, cache_of
+from viewsphere.caches import budget, cache_folder, cache_of
 from viewsphere.scratch import scratch_folder, sweep
 
 if TYPE_CHECKING:
@@ -82,11 +82,15 @@ def write_entry(file: Path, about: Any, arrays: Arrays) -> None:
 
 
 @contextmanager
-def making(file: Path) -> Generator[Path]:
-    """A temporary path for an entry's file, which becomes visible when the block ends. Raises OSError if writing fails."""
+def making(file: Path, kind: Path | None = None) -> Generator[Path]:
+    """A temporary path for an entry's file, which becomes visible when the block ends. Raises OSError if writing fails.
+
+    `kind` is the folder of the entry's kind, where killed processes' files are removed; by default the one that holds the file.
+    """
+    kind = kind or file.parent
     file.parent.mkdir(parents=True, exist_ok=True)
-    sweep_once(file.parent, PREFIX, os.getpid())
-    with scratch_folder(file.parent, PREFIX) as place:
+    sweep_once(kind, PREFIX, os.getpid())
+    with scratch_folder(kind, PREFIX) as place:
         half = place / file.name
         yield half
         publish(half, file)
@@ -102,12 +106,14 @@ def sweep_once(folder: Path, prefix: str, process: int) -> None:
 
 def publish(half: Path, file: Path) -> None:
     """Turn a complete file into a cache entry, and keep the cache within its limit. An entry that alone would fill the cache is
-    not stored. Raises OSError if renaming fails.
+    not stored. A file in another folder does not count. Raises OSError if renaming fails.
     """
-    size = half.stat().st_size
-    if budget.takes(size) or file.suffix in budget.READ_BY_PATH:
+    if cache_folder() in file.parents:
+        size = half.stat().st_size
+        if not budget.takes(size) and file.suffix not in budget.READ_BY_PATH:
+            return
         budget.make_room(size)
-        half.replace(file)
+    half.replace(file)
 
 
 def note_use(file: Path) -> None:

@@ -11,10 +11,8 @@ from __future__ import annotations
 import hashlib
 import multiprocessing
 import os
-import secrets
 import sys
 import tempfile
-import time
 import zlib
 from contextlib import suppress
 from functools import cache
@@ -22,8 +20,7 @@ from pathlib import Path
 from stat import S_ISLNK, S_ISREG, S_IWGRP, S_IWOTH
 
 from viewsphere.caches import cache_of
-from viewsphere.caches.entries import note_use
-from viewsphere.scratch import STALE_S
+from viewsphere.caches.entries import making, note_use
 
 SHIPPED = Path(__file__).with_name("shipped")
 """The folder of entries that wheels include; source distributions have none."""
@@ -69,7 +66,7 @@ def save(name: str, content: bytes) -> None:
     for folder in _folders():
         if _make(folder) and _make((folder / name).parent):
             with suppress(OSError):  # full
-                _write(folder / name, data)
+                _write(folder, name, data)
                 return
 
 
@@ -131,31 +128,17 @@ def _make(folder: Path) -> bool:
         if not folder.is_dir():
             folder.parent.mkdir(parents=True, exist_ok=True)
             folder.mkdir(mode=0o700, exist_ok=True)
-            _sweep(folder.parent)
     except OSError:
         return False
     return _is_own(folder) and os.access(folder, os.W_OK)
 
 
-def _write(file: Path, data: bytes) -> None:
-    half = file.with_name(f".{file.name}.{secrets.token_hex(8)}")
-    try:
+def _write(folder: Path, name: str, data: bytes) -> None:
+    """Write an entry that this user alone may write, whatever the umask."""
+    with making(folder / name, folder) as half:
         descriptor = os.open(half, os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_NOFOLLOW", 0), 0o600)
         with os.fdopen(descriptor, "wb") as stream:
             stream.write(data)
-        half.replace(file)
-    except BaseException:
-        with suppress(OSError):
-            half.unlink()
-        raise
-
-
-def _sweep(folder: Path) -> None:
-    """Remove old unfinished files of killed processes."""
-    for left in folder.glob(f"*/.*{SUFFIX}.*"):
-        with suppress(OSError):
-            if left.stat().st_mtime < time.time() - STALE_S:
-                left.unlink()
 
 
 def _user() -> str:

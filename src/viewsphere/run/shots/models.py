@@ -6,18 +6,24 @@ import hashlib
 from collections.abc import Callable, Iterable
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, fields, replace
-from functools import cached_property
+from functools import cache, cached_property
+from importlib.metadata import version
 from itertools import chain
 from pathlib import Path
 from textwrap import shorten
 
+from viewsphere import codecs
 from viewsphere.assets.animation.deforming import DeformingMesh
-from viewsphere.assets.cache import frame_of, read_ahead
+from viewsphere.assets.cache import frame_of, read_ahead, readers_digest
 from viewsphere.assets.exporting.export import export_deforming, export_glb, export_obj
 from viewsphere.assets.mesh import Mesh
+from viewsphere.caches.budget import EXPORTS
+from viewsphere.caches.folders import cached_files
 from viewsphere.errors import StoreError, each
 from viewsphere.files import read_bytes
 from viewsphere.geometry.box3d import Box3d
+from viewsphere.kernels.build import HOST
+from viewsphere.kernels.digests import package_digest
 from viewsphere.labels import ShotAppearance, labels, requires
 from viewsphere.model.credit import Credit
 from viewsphere.model.model_spec import ModelSpec
@@ -120,7 +126,7 @@ class Models:
         """Export a model into a folder, with all its time steps if it deforms."""
         info, export = self._made(spec, steps, credit)
         with place as folder:
-            export(folder)
+            cached_files(EXPORTS, _digest_of_export(info), export, folder)
             self.store.write_model_info(folder, info)
 
     def _still(self, spec: ModelSpec) -> tuple[ModelInfo, Export]:
@@ -197,6 +203,18 @@ class Models:
                         f"{self.store.root}: expected {name} {_short(getattr(info, name))} of model {info.key!r}, as the data "
                         f"set has; found {_short(value)}: keep it, or choose another output folder"
                     )
+
+
+def _digest_of_export(info: ModelInfo) -> str:
+    """The digest of all that the files of a model depend on: meshes, names, times of their frames, and what writes them."""
+    frames = [(one.key, one.digest, one.step) for one in info.steps]
+    return hashlib.sha256(repr((_writers(), info.key, info.digest, frames)).encode()).hexdigest()
+
+
+@cache
+def _writers() -> str:
+    """The sources that write models' files, and the processor's type and the library on which the bytes of PNG files depend."""
+    return f"{readers_digest()} {package_digest(Path(codecs.__file__).parent)} {HOST} {version('isal')}"
 
 
 def _short(value: object) -> str:
