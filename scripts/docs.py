@@ -44,6 +44,7 @@ from viewsphere.plugins.effect import EffectSpec
 from viewsphere.plugins.engine import EngineSpec
 from viewsphere.plugins.format import FormatSpec
 from viewsphere.plugins.material import MaterialSpec
+from viewsphere.plugins.source import sources
 from viewsphere.recipe.recipe import schema
 from viewsphere.run.reports.format_list import Listed, listed
 from viewsphere.run.reports.plugin_list import SPECS
@@ -255,6 +256,20 @@ def model_files_page() -> str:
     )
     table = "\n| Kind | Up, front | Unit |\n|---|---|---|\n" + rows
     return KINDS.sub(lambda found: found[1] + table, (DOCS / "formats-in.md").read_text("utf-8"))
+
+
+SETS = re.compile(r"(<!-- sets of models, written by scripts/docs -->\n).*?(?=\n<!-- end -->)", re.DOTALL)
+
+
+def asset_sets_page() -> str:
+    """The hand-written page with a table of the sets that sources read."""
+    text = "\n| Source | Set and layout | Category | Axes and unit | Licence | Tried on |\n|---|---|---|---|---|---|\n"
+    for name, source in sorted(sources().items()):
+        if (found := source.folder) is not None and not plugins.is_third_party("sources", name):
+            tried = "files of the set" if found.is_tried else "made trees only"
+            row = (f"`{name}:`", f"{found.title}: `{found.layout}`", found.category, found.axes, found.licence, tried)
+            text += f"| {' | '.join(row)} |\n"
+    return SETS.sub(lambda found: found[1] + text, (DOCS / "asset-sets.md").read_text("utf-8"))
 
 
 FIELDS = re.compile(r"(<!-- fields of (.+?), written by scripts/docs -->\n).*?(?=\n<!-- end -->)", re.DOTALL)
@@ -506,6 +521,7 @@ PAGES = {
     "proofs.md": proofs_page,
     "formats.md": partial(options_page, "formats", "formats.md"),
     "formats-in.md": model_files_page,
+    "asset-sets.md": asset_sets_page,
     "motion.md": partial(options_page, "motions", "motion.md"),
     "layouts.md": partial(options_page, "placers", "layouts.md"),
     "recipe.md": recipe_page,

@@ -10,20 +10,20 @@ from viewsphere.model.credit import Credit
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.plugins.family import ZooFamily
 from viewsphere.plugins.place import PlaceSpec
-from viewsphere.plugins.source import Download, SourceSpec
+from viewsphere.plugins.source import Download, SourceModel, SourceSpec
 from viewsphere.validation.errors import one_of
 from viewsphere_zoo import ANY, build_zoo_model, family, family_names, things
 
 CREDIT = Credit(licence="Apache-2.0", attribution="The viewsphere contributors")
 
 
-def expand(name: str) -> tuple[str, ...]:
+def expand(name: str) -> tuple[SourceModel, ...]:
     """The families that a name selects. Raises UserError for an unknown name."""
     if name == ANY:
-        return things()
+        return tuple(map(SourceModel, things()))
     if name not in family_names():
         raise UserError(one_of(name, family_names()))
-    return (name,)
+    return (SourceModel(name),)
 
 
 def facts(name: str) -> ZooFamily | None:

@@ -6,7 +6,7 @@ import re
 import sys
 from collections.abc import Sequence
 from contextlib import ExitStack, nullcontext, redirect_stdout
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -48,6 +48,7 @@ if TYPE_CHECKING:
     from viewsphere.planning.plan import Plan
     from viewsphere.recipe.recipe import Recipe
     from viewsphere.run.estimate import Estimate
+    from viewsphere.run.reports.set_report import SetReport
 
 
 def new(
@@ -141,7 +142,11 @@ def schema() -> None:
 def inspect(
     model: Annotated[
         str | None,
-        typer.Argument(help="Model file, or a name such as zoo:car.", show_default=False, autocompletion=completion.models),
+        typer.Argument(
+            help="Model file, a name such as zoo:car, or a set of models such as gso:FOLDER.",
+            show_default=False,
+            autocompletion=completion.models,
+        ),
     ] = None,
     output: Annotated[
         Path | None,
@@ -165,9 +170,12 @@ def inspect(
     json_: AsJson = False,
     allow_scripts: AllowScripts = False,
 ) -> None:
-    """Show a model's size, axes, parts, materials, animations, warnings, and a picture from four sides; or a recipe's rig."""
+    """Show a model's size, axes, parts, materials, animations, warnings, and a picture from four sides; or the models of a set,
+    or a recipe's rig.
+    """
     from viewsphere.preview import four_sides
     from viewsphere.run.reports.inspection import inspect_model, model_spec, report_lines
+    from viewsphere.run.reports.set_report import set_report
 
     if (model is None) == (rig is None):
         raise UserError(
@@ -177,6 +185,9 @@ def inspect(
         _inspect_rig(rig, output, changes, json_)
         return
     assert model is not None
+    if (found := set_report(model)) is not None:
+        _inspect_set(found, output, json_)
+        return
     _compile_kernels()
     spec = model_spec(model, up=up, forward=forward, unit=unit, seed=seed)
     report = inspect_model(spec)
@@ -189,6 +200,26 @@ def inspect(
         say(line)
     hint = "the first view must show the front; if another does, give --forward as written below that one"
     say(f"picture from four sides: {picture} ({hint})")
+
+
+def _inspect_set(report: SetReport, output: Path | None, json_: bool) -> None:
+    """Show the models of a set: their numbers, broken ones, and a sheet of a few of them."""
+    from viewsphere.preview import one_view_each
+    from viewsphere.run.reports.set_report import set_lines
+
+    _compile_kernels()
+    sheet, faults = one_view_each(report.shown)
+    report = replace(report, faults=report.faults | faults)
+    picture = output or Path(f"{Path(report.source.replace(':', '-')).name}-models.png")
+    if sheet is not None:
+        write_picture(picture, sheet)
+    if json_:
+        shown = [spec.key for spec in report.shown if spec.key not in faults]
+        print_json({**asdict(report), "shown": shown, "picture": None if sheet is None else str(picture)})
+        return
+    for line in set_lines(report):
+        say(line)
+    say(f"{len(report.shown) - len(faults)} of them: {picture}" if sheet is not None else "no model to show")
 
 
 def _inspect_rig(recipe: Path, output: Path | None, changes: list[str] | None, json_: bool) -> None:

@@ -26,12 +26,22 @@ from viewsphere.limits import limits
 from viewsphere.model.fields.file_names import is_reserved
 from viewsphere.model.model_spec import ModelSpec, Size
 from viewsphere.plugins import checked
-from viewsphere.plugins.source import Named, SourceSpec, model_for, source_of, suggested
+from viewsphere.plugins.source import (
+    Named,
+    SourceModel,
+    SourceSpec,
+    from_folder,
+    model_for,
+    source_of,
+    suggested,
+)
+from viewsphere.printable import printable
 from viewsphere.recipe.draws import drawn
 from viewsphere.recipe.models import Dimensions, Length, ModelEntry, SizeTable, unit_metres
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.store import Category
 from viewsphere.validation.errors import Nearest
+from viewsphere.validation.quantity import quantity
 
 LONGEST_KEY = 150
 """Longest key in bytes: names of files, and of folders during writing, add about a hundred bytes to it, and may have 255."""
@@ -44,14 +54,19 @@ Sizes = Mapping[str, tuple[float, float, float]]
 class _Found:
     """A model that an entry means: the entry's index, the key it would like, a file's path or a name such as `zoo:car`.
 
-    is_drawn: whether a seed decides which model it is. is_file: whether no source supplies it.
+    is_drawn: whether a seed decides which model it is. facts: what its source states about it; None for a file.
     """
 
     entry: int
     key: str
     source: str
     is_drawn: bool = False
-    is_file: bool = False
+    facts: SourceModel | None = None
+
+    @property
+    def is_file(self) -> bool:
+        """True if no source supplies it."""
+        return self.facts is None
 
 
 def count_models(recipe: Recipe) -> int:
@@ -63,7 +78,7 @@ def count_models(recipe: Recipe) -> int:
         names = _expanded(recipe, index)
         if not names:
             return len(_files(recipe, index))
-        single = sum(len(expanded) for named, expanded in names if not named.spec.drawn)
+        single = len(_chosen(recipe, index, names))
         return single + sum(_count(recipe, index) for named, _ in names if named.spec.drawn)
 
     return sum(each(count, (i for i, entry in enumerate(recipe.models) if entry.is_labelled)))
@@ -91,7 +106,7 @@ def numbered_specs(recipe: Recipe) -> tuple[tuple[ModelSpec, int], ...]:
         entry = recipe.models[model.entry]
         if model.is_file:
             _check_file(entry, model)
-        category = _category(entry, model.source)
+        category, facts = _category(entry, model.facts), model.facts or SourceModel("")
         spec = ModelSpec(
             key=model.key,
             source=model.source,
@@ -99,9 +114,9 @@ def numbered_specs(recipe: Recipe) -> tuple[tuple[ModelSpec, int], ...]:
             category=category,
             supercategory=entry.supercategory,
             category_id=ids[category] if entry.is_labelled else 0,
-            up=entry.up,
-            forward=entry.forward,
-            unit=None if entry.unit is None else unit_metres(entry.unit),
+            up=entry.up or facts.up,
+            forward=entry.forward or facts.forward,
+            unit=facts.unit if entry.unit is None else unit_metres(entry.unit),
             centring=entry.centring,
             scale=_scale(recipe, entry, model.key),
             real_size=_real_size(recipe, model, table, hint),
@@ -165,8 +180,8 @@ def categories(recipe: Recipe) -> tuple[Category, ...]:
 
     def add(i: int) -> None:
         entry = recipe.models[i]
-        for source in _single(recipe, i):
-            name = _category(entry, source)
+        for model in _single(recipe, i):
+            name = _category(entry, model)
             category = result.setdefault(name, Category(len(result) + 1, name, entry.supercategory))
             if category.supercategory != entry.supercategory:
                 raise RecipeError(
@@ -178,30 +193,57 @@ def categories(recipe: Recipe) -> tuple[Category, ...]:
     return tuple(result.values())
 
 
-def _expanded(recipe: Recipe, index: int) -> tuple[tuple[Named, tuple[str, ...]], ...]:
-    """The names of an entry that sources expand, each with its single models; none for an entry of files.
-    Raises RecipeError for an unknown name.
+Expanded = tuple[tuple[Named, tuple[SourceModel, ...]], ...]
+"""The names of an entry that sources expand, each with its single models."""
+
+
+def _expanded(recipe: Recipe, index: int) -> Expanded:
+    """The names of an entry that sources expand, without models that cannot be used; none for an entry of files.
+    Raises RecipeError for an unknown name, and for one without any usable model.
     """
-    expanded: list[tuple[Named, tuple[str, ...]]] = []
+    expanded: list[tuple[Named, tuple[SourceModel, ...]]] = []
+    for origin, models in _listed(recipe, index):
+        usable = tuple(model for model in models if not model.fault)
+        if models and not usable:
+            raise RecipeError(
+                f"models[{index}].source: {origin.prefix}: none of {quantity(len(models), 'model')} can be used. The first, "
+                f"{printable(models[0].name)}: {models[0].fault}"
+            )
+        expanded.append((origin, usable))
+    return tuple(expanded)
+
+
+def _listed(recipe: Recipe, index: int) -> Iterator[tuple[Named, tuple[SourceModel, ...]]]:
+    """The names of an entry that sources expand, each with all of its models."""
     for source in recipe.models[index].names:
-        named = source_of(source)
+        named = source_of(from_folder(source, recipe.folder))
         assert named is not None
         try:
-            names = checked(SourceSpec, named.prefix, "expand", named.spec.expand(named.name), tuple)
-            expanded.append((named, names))
+            yield named, checked(SourceSpec, named.prefix, "expand", named.spec.expand(named.name), tuple)
         except PluginError:
             raise
         except UserError as error:
             raise RecipeError(f"models[{index}].source: {named.prefix}: {error}") from None
-    return tuple(expanded)
 
 
-def _single(recipe: Recipe, index: int) -> Iterator[str]:
-    """The sources of all single models that an entry may have, as far as its category depends on them."""
-    entry = recipe.models[index]
-    if entry.category or not entry.names:
-        return iter(entry.source)
-    return (f"{named.prefix}:{name}" for named, names in _expanded(recipe, index) for name in names)
+def _chosen(recipe: Recipe, index: int, names: Expanded) -> list[tuple[Named, SourceModel]]:
+    """The single models of an entry whose names stand for one model each: all, or as many as its count draws among them."""
+    models = [(origin, model) for origin, models in names if not origin.spec.drawn for model in models]
+    if recipe.models[index].count is None or not models:
+        return models
+    count = _count(recipe, index)
+    if count > len(models):
+        raise RecipeError(f"models[{index}].count: expected at most {len(models):,}, the number of models; found {count:,}")
+    order = [share(recipe.lasting_seed, "models", "chosen", model.key or model.name) for _, model in models]
+    drawn = sorted(range(len(models)), key=order.__getitem__)[:count]
+    return [models[i] for i in sorted(drawn)]
+
+
+def _single(recipe: Recipe, index: int) -> Iterator[SourceModel | None]:
+    """All single models that an entry may have, as far as its category depends on them; None for those of files."""
+    if recipe.models[index].category:
+        return iter((None,))
+    return (model for _, models in _expanded(recipe, index) for model in models)
 
 
 def _count(recipe: Recipe, index: int) -> int:
@@ -237,29 +279,32 @@ def _sidecar(recipe: Recipe, index: int) -> str | None:
     return Path(os.path.normpath(path)).as_posix()
 
 
-def _category(entry: ModelEntry, source: str) -> str:
-    return entry.category or source.partition(":")[2].replace("_", " ")
+def _category(entry: ModelEntry, model: SourceModel | None) -> str:
+    if entry.category or model is None:
+        return entry.category
+    return model.category or model.name.replace("_", " ")
 
 
 def _found(recipe: Recipe, index: int) -> Iterator[_Found]:
     entry = recipe.models[index]
     prefix = f"{entry.name}_" if entry.name else ""
-    for origin, names in _expanded(recipe, index):
-        if not origin.spec.drawn:
-            yield from (_Found(index, _short(_free(prefix + _as_key(n))), f"{origin.prefix}:{n}") for n in names)
-            continue
+    names = _expanded(recipe, index)
+    for origin, model in _chosen(recipe, index, names):
+        key = _short(_free(prefix + _as_key(model.key or model.name)))
+        yield _Found(index, key, f"{origin.prefix}:{model.name}", facts=model)
+    for origin, models in ((origin, models) for origin, models in names if origin.spec.drawn):
         for number in range(_count(recipe, index)):
-            key = f"{entry.name or _as_key(origin.name)}_{number:03d}"
-            yield _Found(index, key, f"{origin.prefix}:{_drawn_name(recipe, names, number)}", is_drawn=True)
+            key, model = f"{entry.name or _as_key(origin.name)}_{number:03d}", _drawn_model(recipe, models, number)
+            yield _Found(index, key, f"{origin.prefix}:{model.name}", is_drawn=True, facts=model)
     if not entry.names:
         for file in _files(recipe, index):
-            yield _Found(index, _short(_free(prefix + _as_key(file.stem))), file.as_posix(), is_file=True)
+            yield _Found(index, _short(_free(prefix + _as_key(file.stem))), file.as_posix())
 
 
-def _drawn_name(recipe: Recipe, names: Sequence[str], number: int) -> str:
-    """The name of a drawn model: each in turn before one comes again, every round in an order of its own."""
-    turn, place = divmod(number, len(names))
-    return sorted(names, key=lambda name: share(recipe.lasting_seed, "family", str(turn), name))[place]
+def _drawn_model(recipe: Recipe, models: Sequence[SourceModel], number: int) -> SourceModel:
+    """A drawn model: each name in turn before one comes again, every round in an order of its own."""
+    turn, place = divmod(number, len(models))
+    return sorted(models, key=lambda model: share(recipe.lasting_seed, "family", str(turn), model.name))[place]
 
 
 def _as_key(text: str) -> str:
@@ -290,7 +335,17 @@ def _files(recipe: Recipe, index: int) -> tuple[Path, ...]:
 
 
 def left_out(recipe: Recipe) -> Iterator[str]:
-    """A warning for each entry whose folders and patterns hold files that only Blender reads, and that no entry names."""
+    """A warning for each entry with models of a source that cannot be used, and for each entry whose folders and patterns hold
+    files that only Blender reads, and that no entry names.
+    """
+    for i in range(len(recipe.models)):
+        for origin, models in _listed(recipe, i):
+            if faulty := [model for model in models if model.fault]:
+                first = printable(faulty[0].key or faulty[0].name)
+                yield (
+                    f"models[{i}].source: {origin.prefix}: {quantity(len(faulty), 'model')} of {len(models):,} left out, e.g. "
+                    f"{first}: {faulty[0].fault}"
+                )
     taken = cache(lambda: {file for i, entry in enumerate(recipe.models) if not entry.names for file in _files(recipe, i)})
     for i, entry in enumerate(recipe.models):
         sources = () if entry.names else entry.source
@@ -414,7 +469,7 @@ def _real_size(recipe: Recipe, found: _Found, table: Callable[[Path], Sizes], hi
     size = recipe.models[found.entry].real_size
     if isinstance(size, Dimensions):
         return size.width, size.height, size.length
-    if size == "file" or (size is None and not found.is_file):
+    if size == "file" or (size is None and found.facts is not None and found.facts.is_metric):
         return "file"
     if size is None:
         return None

@@ -80,7 +80,7 @@ SEAMS: dict[Kind, Seam] = {
     "readers": Seam("viewsphere.assets.readers", "READER"),
     "places": Seam("", "PLACE"),
     "samplers": Seam("viewsphere.planning.samplers", "SAMPLER"),
-    "sources": Seam("", "SOURCE"),
+    "sources": Seam("viewsphere.assets.sources", "SOURCE"),
     "trajectories": Seam("viewsphere.composing.trajectories", "TRAJECTORY"),
 }
 

@@ -14,7 +14,7 @@ from pydantic import Field, InstanceOf
 
 from viewsphere.errors import PluginError, UserError
 from viewsphere.model.credit import Credit
-from viewsphere.model.model_spec import ModelSpec
+from viewsphere.model.model_spec import Axis, ModelSpec
 from viewsphere.plugins.family import ZooFamily
 from viewsphere.plugins.place import PlaceSpec
 from viewsphere.plugins.registry import Kind, checked, gap, is_third_party, load, loadable, names, prefix_of
@@ -35,6 +35,52 @@ class Download(NamedTuple):
     file: Callable[[], str | None]
 
 
+class SourceModel(NamedTuple):
+    """A single model of a source, as known before it is read.
+
+    Attributes:
+        name: The name after the source's prefix; for a source of folders, the absolute path of the model.
+        key: The preferred key of the model in a data set; empty: the name.
+        category: The category; empty: the name.
+        split: The split in which the set lists the model; empty if it lists none.
+        up: The file's axis that points up; None: the format's.
+        forward: The file's axis that the front faces; None: the format's.
+        unit: Metres in one unit of the file; None: the file's.
+        is_metric: Whether the file has the true size of the object.
+        fault: The reason why the model cannot be used; empty if none is known. Recipes leave such models out.
+    """
+
+    name: str
+    key: str = ""
+    category: str = ""
+    split: str = ""
+    up: Axis | None = None
+    forward: Axis | None = None
+    unit: float | None = None
+    is_metric: bool = True
+    fault: str = ""
+
+
+class AssetSet(NamedTuple):
+    """A public set of models in a folder of the user's, for messages and documentation.
+
+    Attributes:
+        title: The name of the set.
+        layout: The paths that are read, below the folder.
+        category: The origin of the categories.
+        axes: The axes of its files that are up and front, and their unit.
+        licence: The licence or the terms of the set.
+        is_tried: Whether the source was tried on files of the set itself, not only on trees that tests make.
+    """
+
+    title: str
+    layout: str
+    category: str
+    axes: str
+    licence: str
+    is_tried: bool = False
+
+
 def _no_names() -> tuple[str, ...]:
     return ()
 
@@ -45,10 +91,15 @@ class SourceSpec(Spec):
     KIND: ClassVar[Kind] = "sources"
 
     names: Callable[[], tuple[str, ...]] = Field(
-        description="names to list and complete, sorted; a long list may leave names out"
+        default=_no_names, description="names to list and complete, sorted; a long list may leave names out"
     )
-    expand: Callable[[str], tuple[str, ...]] = Field(
-        description="`expand(name)`: the names of single models that a name stands for. Raises UserError for an unknown name"
+    expand: Callable[[str], tuple[SourceModel, ...]] = Field(
+        description="`expand(name)`: the single models that a name stands for, without reading them. Raises UserError for an "
+        "unknown name"
+    )
+    folder: InstanceOf[AssetSet] | None = Field(
+        default=None,
+        description="the set of models that the source reads from a folder; names are then paths, relative to the recipe",
     )
     load: Callable[[ModelSpec], Any] = Field(
         description="`load(model)`: the `viewsphere.assets.mesh.Mesh` in object axes, metres; or the path of a file to read"
@@ -90,6 +141,26 @@ def source_of(text: str) -> Named | None:
     """The source that a model's or place's text names, such as `zoo:car`; None for a file."""
     prefix = prefix_of(text)
     return Named(load(SourceSpec, prefix), prefix, text[len(prefix) + 1 :]) if prefix else None
+
+
+def from_folder(text: str, folder: Path) -> str:
+    """The text, in which the relative path of a source of folders, such as `gso:../scans`, starts from `folder`."""
+    named = source_of(text)
+    if named is None or named.spec.folder is None or named.name.startswith("~"):
+        return text
+    return f"{named.prefix}:{Path(folder, named.name).as_posix()}"
+
+
+def from_set(text: str) -> AssetSet | None:
+    """The set that a model's text names, such as `gso:scans/Mug`; None for files and for models of other sources."""
+    named = source_of(text)
+    return None if named is None else named.spec.folder
+
+
+def is_there(text: str) -> bool:
+    """Return whether a model of a source exists; False for files and for a missing path of a source of folders."""
+    named = source_of(text)
+    return named is not None and (named.spec.folder is None or Path(named.name).exists())
 
 
 def is_versioned(text: str) -> bool:

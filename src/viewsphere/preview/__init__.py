@@ -6,7 +6,7 @@ from viewsphere.model.sample import Sample
 from viewsphere.planning.checks.warnings import SMALLEST, TOO_SMALL
 from viewsphere.preview.frame import INK, PAPER, draw_sample
 from viewsphere.preview.shown import dataset_samples, preview_samples
-from viewsphere.preview.sides import four_sides
+from viewsphere.preview.sides import four_sides, one_view_each
 from viewsphere.preview.tiles import contact_sheet
 from viewsphere.preview.video import Video, write_video
 from viewsphere.recipe.recipe import Recipe
@@ -24,6 +24,7 @@ __all__ = [
     "draw_sample",
     "films_of",
     "four_sides",
+    "one_view_each",
     "preview_samples",
     "small_objects",
     "write_video",

@@ -96,8 +96,8 @@ class ModelEntry(OmitNone):
         OrShort({"type": "string"}),
     ] = Field(
         min_length=1,
-        description="a file, a pattern such as cars/*.obj, a folder, zoo:<family>, or a list of these. zoo:any draws "
-        "among all shipped families of things. Paths are relative to the recipe",
+        description="a file, a pattern such as cars/*.obj, a folder, zoo:<family>, a set such as gso:FOLDER, or a list of "
+        "these. zoo:any draws among all shipped families of things. Paths are relative to the recipe",
     )
     category: str = Field(
         default="",
@@ -108,8 +108,8 @@ class ModelEntry(OmitNone):
     supercategory: str = Field(default="", max_length=200, description="a broader category, such as vehicle")
     count: CountDrawn | None = Field(
         default=None,
-        description="zoo: number of models to draw (default 1), a number, [low, high] or a distribution; files: required "
-        "number of files",
+        description="zoo: number of models to draw (default 1), a number, [low, high] or a distribution; sets: number of "
+        "models to draw among them (default: all); files: required number of files",
     )
     name: Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_-]*$", max_length=100)] | None = Field(
         default=None,

@@ -10,6 +10,7 @@ from pathlib import Path
 from viewsphere.errors import ModelError, RecipeError, ViewsphereError, WorkerDied, joined
 from viewsphere.planning.distances import Distances
 from viewsphere.planning.extension import DatasetPart
+from viewsphere.plugins.source import from_set
 from viewsphere.rendering.sky.environment_file import environment_notes
 from viewsphere.run.executors import Job, Listed, Outcome, Work, WorkerPool
 from viewsphere.run.missing import Missing
@@ -72,7 +73,9 @@ def render_part(
 
 
 def _prepare_models(portion: DatasetPart, store: Store, pool: WorkerPool, keep_going: bool, tell: Listener) -> dict[str, str]:
-    """Normalise and export every model; returns the keys left out, with the reasons."""
+    """Normalise and export every model; returns the keys left out, with the reasons. Of sets of thousands of models a few are
+    always damaged, so that those are left out without `keep_going`, too.
+    """
     planned = portion.plan
     jobs = _model_jobs("same model" if portion.number else "model", portion)
     total = len(jobs.all)
@@ -85,7 +88,8 @@ def _prepare_models(portion: DatasetPart, store: Store, pool: WorkerPool, keep_g
     for key, problem in _distance_problems(portion, store, failed):
         failed.setdefault(key, problem)
     own = {m.key for m in planned.model_specs} | set(planned.varied_subjects)
-    stops = [e for k, e in failed.items() if not (keep_going and k in own and isinstance(e, (ModelError, RecipeError)))]
+    may_fail = own if keep_going else {m.key for m in planned.model_specs if from_set(m.source)}
+    stops = [e for k, e in failed.items() if not (k in may_fail and isinstance(e, (ModelError, RecipeError)))]
     elsewhere = {} if portion.shard.is_all else store.skipped()
     if stops or (failed and own <= failed.keys() | elsewhere.keys()):
         raise joined(stops or list(failed.values()))

@@ -21,7 +21,7 @@ from viewsphere.files import read_bytes, read_text
 from viewsphere.planning.engine_digest import script_digest
 from viewsphere.planning.extension import NOTHING, DatasetPart, extend
 from viewsphere.planning.plan import Plan
-from viewsphere.plugins import prefix_of
+from viewsphere.plugins.source import is_there
 from viewsphere.run.shots.composing import Composer
 from viewsphere.run.shots.replanning import AnotherPlan, Replanned
 from viewsphere.run.shots.stages import Stages, StoredBoxes
@@ -137,7 +137,7 @@ class Recomputed:
         rows = (next(index.rows_of(subject)) for subject, _ in zip(index.counts, range(MOST_SUBJECTS), strict=False))
         shots = (store.labelled(row.key) for row in rows if store.has_shot(row.key))
         sources = {thing.model.source for shot in shots if shot for thing in shot.things}
-        return not all(prefix_of(source) or split_source(Path(source))[0].exists() for source in sources)
+        return not all(is_there(source) or split_source(Path(source))[0].exists() for source in sources)
 
     def _judge(self, number: int, planned: Plan) -> None:
         """Record whether a part contradicts its recipe, or whether files named by the recipe have changed."""

@@ -13,6 +13,7 @@ from typing import Any, cast
 from viewsphere.errors import RecipeError
 from viewsphere.model.scene import Background, Ground
 from viewsphere.plugins import prefix_of
+from viewsphere.plugins.source import from_folder
 from viewsphere.recipe.draws import KINDS
 from viewsphere.recipe.entries import pictures_of
 from viewsphere.recipe.reading.file import parse, read
@@ -221,9 +222,9 @@ def _rebased(data: Any, pattern: tuple[str, ...], folder: str) -> Any:
     if isinstance(data, dict) and isinstance(data.get("choice"), list):
         return {**data, "choice": [_rebased(option, pattern, folder) for option in data["choice"]]}
     if not pattern:
-        if not isinstance(data, str) or data in WORDS or data.startswith("~") or prefix_of(data):
+        if not isinstance(data, str) or data in WORDS or data.startswith("~"):
             return data
-        return Path(folder, data).as_posix()
+        return from_folder(data, Path(folder)) if prefix_of(data) else Path(folder, data).as_posix()
     step, rest = pattern[0], pattern[1:]
     if step == "*" and isinstance(data, list):
         return [_rebased(item, rest, folder) for item in cast(list[Any], data)]

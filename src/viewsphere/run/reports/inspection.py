@@ -11,7 +11,7 @@ from viewsphere.assets.animation.clip import Timeline
 from viewsphere.assets.inspect import ModelReport, describe
 from viewsphere.errors import UserError
 from viewsphere.model.model_spec import Axis, ModelSpec
-from viewsphere.plugins.source import source_of
+from viewsphere.plugins.source import SourceModel, source_of
 from viewsphere.recipe.models import UNITS, unit_metres
 from viewsphere.validation.errors import one_of
 
@@ -23,25 +23,31 @@ def model_spec(
     forward: str | None = None,
     unit: str | None = None,
     seed: int = 0,
+    facts: SourceModel | None = None,
 ) -> ModelSpec:
-    """A model file or `zoo:car` with the given settings, and defaults for the others.
+    """A model file or `zoo:car` with the given settings, and defaults for the others: `facts` of the model's source, by default
+    what the source of a set states.
 
-    Raises UserError for an invalid axis or unit.
+    Raises UserError for an invalid axis or unit, and for a model that a set does not have.
     """
     for name, axis in (("up", up), ("forward", forward)):
         if axis is not None and axis not in get_args(Axis):
             raise UserError(f"--{name}: {one_of(axis, get_args(Axis))}")
     named = source_of(source)
     is_drawn = named is not None and named.spec.drawn
+    if named is not None and named.spec.folder is not None:
+        facts = facts or named.spec.expand(named.name)[0]
+        source = f"{named.prefix}:{facts.name}"
+    facts = facts or SourceModel(source)
     return ModelSpec(
         key=Path(source.replace(":", "-")).stem or "model",
         source=source if named else str(Path(source).absolute()),
         seed=seed if is_drawn else None,
         category="model",
         category_id=1,
-        up=cast("Axis | None", up),
-        forward=cast("Axis | None", forward),
-        unit=None if unit is None else _metres(unit),
+        up=cast("Axis | None", up) or facts.up,
+        forward=cast("Axis | None", forward) or facts.forward,
+        unit=facts.unit if unit is None else _metres(unit),
     )
 
 
