@@ -28,7 +28,8 @@ OTHERS = ("cluster_name", "apiVersion", "axes")
 """What files begin with that are no recipes: a cluster's, a job's, a model's sidecar."""
 
 FILES = re.compile(
-    r"[\w*/-]+\.(?:ya?ml|csv|jsonl?|blend|fbx|obj|glb|gltf|png|jpe?g|exr|hdr|txt)\b|\b(?:images|textures|hdri|extends): "
+    r"[\w*/-]+\.(?:ya?ml|csv|jsonl?|blend|fbx|obj|glb|gltf|png|jpe?g|exr|hdr|txt)\b"
+    r"|\b(?:images|textures|hdri|extends): |\w:\.\./"
 )
 """Files and folders of the reader's."""
 
