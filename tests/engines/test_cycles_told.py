@@ -141,7 +141,7 @@ def test_views_hold_every_ray_where_the_lens_has_it(lens):
     turn = np.linalg.qr(np.random.default_rng(0).normal(size=(3, 3)))[0]
     turn *= np.linalg.det(turn)
     camera = Camera(intrinsics, turn, np.array([0.1, -0.2, 0.4]))
-    views = views_of(camera)
+    views = views_of(camera, is_traced=True)
     assert (len(views) > 1) == (lens == "fisheye 220")
     pictures = []
     for view in views:

@@ -16,6 +16,7 @@ from viewsphere.errors import RecipeError, UserError
 from viewsphere.geometry.lenses.orthographic import NARROWEST
 from viewsphere.labels.box3d import LABEL
 from viewsphere.model.sensors.camera import Intrinsics
+from viewsphere.plugins.engine import EngineSpec
 from viewsphere.plugins.format import FormatSpec
 from viewsphere.recipe.formats import FormatEntry
 from viewsphere.run.exports.exporting import write
@@ -157,7 +158,6 @@ def test_the_smallest_width_gives_a_data_set_that_passes_check(tmp_path):
             {"channels": ["rgb", "depth_sensor"]},
             "channels: depth_sensor: expected .* as range cameras have; found ortho",
         ),
-        ({"engine": "cycles"}, "engine: expected one that paints parallel rays beside projection: orthographic; found cycles"),
         ({"scene": {"rain": 5}}, "scene.rain: expected off beside projection: orthographic"),
         ({"variations": {"a": {}, "b": {"rain": 5}}}, "^variations.b.rain: expected off beside projection: orthographic"),
         ({"variations": {"b": {"effects": {"edge_highlight": 1}}}}, "^variations.b.effects.edge_highlight: expected 0 beside"),
@@ -169,6 +169,13 @@ def test_what_it_cannot_have_is_one_line_before_anything_is_rendered(changes, to
     with pytest.raises(RecipeError, match=told) as error:
         plan(parallel_recipe(**changes))
     assert "\n" not in str(error.value)
+
+
+def test_an_engine_without_parallel_rays_refuses_it(monkeypatch):
+    spec = plugins.load(EngineSpec, "raster")
+    monkeypatch.setitem(vars(spec), "parallel_rays", False)
+    with pytest.raises(RecipeError, match="engine: expected one that paints parallel rays beside projection: orthographic"):
+        plan(parallel_recipe())
 
 
 def test_a_stereo_rig_of_it_has_all_other_labels():

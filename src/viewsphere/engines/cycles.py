@@ -24,6 +24,7 @@ ENGINE = EngineSpec(
     stage=stage,
     paints=tuple(PASSES),
     opens_scenes=True,
+    parallel_rays=True,
     programs=PROGRAMS,
     save=save,
     shows_sky=shows_sky,

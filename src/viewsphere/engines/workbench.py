@@ -19,4 +19,12 @@ def _check(options: Mapping[str, JsonValue]) -> None:
     _blender.check(options, "workbench")
 
 
-ENGINE = EngineSpec(check=_check, stage=stage, opens_scenes=True, catches_shadows=False, programs=PROGRAMS, paints=ALL_PICTURES)
+ENGINE = EngineSpec(
+    check=_check,
+    stage=stage,
+    opens_scenes=True,
+    catches_shadows=False,
+    parallel_rays=True,
+    programs=PROGRAMS,
+    paints=ALL_PICTURES,
+)

@@ -124,6 +124,17 @@ class ColmapLens(NamedTuple):
     has_matrix: bool = True
 
 
+class BlenderLens(NamedTuple):
+    """A camera of Blender's that shows the same rays: its `type` and, for PANO, its `panorama_type`; and the values of its
+    properties by their names, apart from `lengths`, which are in metres.
+    """
+
+    type: str
+    panorama: str | None = None
+    values: Mapping[str, float] = {}
+    lengths: Mapping[str, float] = {}
+
+
 class LensSpec(BaseModel):
     """A lens model: typed parameters, and functions whose first value is a `viewsphere.geometry.lenses.Lens`."""
 
@@ -198,6 +209,11 @@ class LensSpec(BaseModel):
     as_colmap: Callable[[Any], ColmapLens | None] | None = Field(
         default=None,
         description="`as_colmap(lens)`: the same lens in COLMAP's terms, or None; None instead of a function: COLMAP has none",
+    )
+    as_blender: Callable[[Any], BlenderLens | None] | None = Field(
+        default=None,
+        description="`as_blender(lens)`: the same lens as a camera of Blender's, or None; None instead of a function: it is "
+        "sampled from pinhole pictures. All have K's principal point as their shift, unless they are panoramas",
     )
     ray_cells: int | None = Field(
         default=None,
@@ -290,6 +306,11 @@ class Lens:
     def colmap(self) -> ColmapLens | None:
         """The same lens in COLMAP's terms; None if COLMAP has no such model."""
         return None if self.spec.as_colmap is None else self.spec.as_colmap(self)
+
+    @cached_property
+    def blender(self) -> BlenderLens | None:
+        """The same lens as a camera of Blender's; None if Blender has no such camera."""
+        return None if self.spec.as_blender is None else self.spec.as_blender(self)
 
     @property
     def record(self) -> dict[str, Any] | None:

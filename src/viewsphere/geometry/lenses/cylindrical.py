@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import math
-from typing import Literal
+from typing import Any, Literal
 
 from pydantic import Field
 
-from viewsphere.geometry.lenses import Calibration, LensOptions, LensParameters, LensSpec
+from viewsphere.geometry.lenses import BlenderLens, Calibration, LensOptions, LensParameters, LensSpec
 from viewsphere.geometry.lenses.shared import panorama
 from viewsphere.geometry.lenses.shared.panorama import Span, SpanField
 
@@ -46,6 +46,20 @@ def _calibrate(options: Options, size: tuple[int, int]) -> Calibration:
     return Calibration(focal, height / (2 * half), width / 2, height / 2, Cylindrical())
 
 
+def _as_blender(lens: Any) -> BlenderLens | None:
+    """Blender's central cylindrical panorama of the same span, if the span ends within half a turn to both sides."""
+    sides = panorama.sides(lens)
+    if sides is None:
+        return None
+    across = {"central_cylindrical_range_u_min": sides.left, "central_cylindrical_range_u_max": sides.right}
+    down = {"central_cylindrical_range_v_min": -sides.bottom, "central_cylindrical_range_v_max": -sides.top}
+    return BlenderLens("PANO", "CENTRAL_CYLINDRICAL", {**across, **down, "central_cylindrical_radius": 1.0})
+
+
 LENS = LensSpec(
-    parameters=Cylindrical, options=Options, calibrate=_calibrate, **panorama.panorama_functions(LIMIT, is_cylinder=True)
+    parameters=Cylindrical,
+    options=Options,
+    calibrate=_calibrate,
+    as_blender=_as_blender,
+    **panorama.panorama_functions(LIMIT, is_cylinder=True),
 )

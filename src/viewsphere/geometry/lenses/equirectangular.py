@@ -7,7 +7,7 @@ from typing import Any, Literal
 
 from pydantic import Field
 
-from viewsphere.geometry.lenses import Calibration, ColmapLens, LensOptions, LensParameters, LensSpec
+from viewsphere.geometry.lenses import BlenderLens, Calibration, ColmapLens, LensOptions, LensParameters, LensSpec
 from viewsphere.geometry.lenses.shared import panorama
 from viewsphere.geometry.lenses.shared.panorama import Span, SpanField
 
@@ -52,10 +52,20 @@ def _as_colmap(lens: Any) -> ColmapLens | None:
     return ColmapLens("EQUIRECTANGULAR", (float(i.width), float(i.height)), has_matrix=False)
 
 
+def _as_blender(lens: Any) -> BlenderLens | None:
+    """Blender's panorama of the same span, if the span ends within half a turn to both sides, and at the poles."""
+    sides = panorama.sides(lens)
+    if sides is None or max(-sides.top, sides.bottom) > LIMIT + panorama.CLOSED:
+        return None
+    span = {"latitude_min": -min(sides.bottom, LIMIT), "latitude_max": min(-sides.top, LIMIT)}
+    return BlenderLens("PANO", "EQUIRECTANGULAR", {"longitude_min": sides.left, "longitude_max": sides.right, **span})
+
+
 LENS = LensSpec(
     parameters=Equirectangular,
     options=Options,
     calibrate=_calibrate,
     as_colmap=_as_colmap,
+    as_blender=_as_blender,
     **panorama.panorama_functions(LIMIT, is_cylinder=False),
 )

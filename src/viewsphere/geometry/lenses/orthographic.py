@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from viewsphere.geometry.lenses import NEAR, Bounds, Calibration, Lens, LensOptions, LensParameters, LensSpec, Rays
+from viewsphere.geometry.lenses import NEAR, BlenderLens, Bounds, Calibration, Lens, LensOptions, LensParameters, LensSpec, Rays
 
 Float = NDArray[np.float64]
 
@@ -96,6 +96,12 @@ def _field_of_view(lens: Lens) -> tuple[float, float]:
     return 0.0, 0.0
 
 
+def _as_blender(lens: Lens) -> BlenderLens | None:
+    """Blender's orthographic camera, unless pixels are skewed."""
+    i = lens.intrinsics
+    return None if i.skew else BlenderLens("ORTHO", lengths={"ortho_scale": i.width / i.fx})
+
+
 LENS = LensSpec(
     parameters=Orthographic,
     options=OrthographicOptions,
@@ -104,6 +110,7 @@ LENS = LensSpec(
     project=_project,
     has_unit_rays=False,
     is_parallel=True,
+    as_blender=_as_blender,
     bounds=_bounds,
     field_of_view=_field_of_view,
 )

@@ -120,19 +120,33 @@ def _straightened(scene, view):
 
 
 def place_camera(scene, view):
-    """Make the camera a pinhole of these intrinsics: the principal point by the sensor's shift, fx / fy by the pixel aspect."""
+    """Make the camera one of these intrinsics: the principal point by the sensor's shift, fx / fy by the pixel aspect."""
     width, height, fx, fy = view["width"], view["height"], view["fx"], view["fy"]
     render = scene.render
     render.resolution_x, render.resolution_y = width, height
+    if view["panorama"] is not None:  # whose properties hold all of K
+        view, fx, fy = {**view, "cx": width / 2, "cy": height / 2}, width, width
     render.pixel_aspect_x, render.pixel_aspect_y = max(fy / fx, 1), max(fx / fy, 1)
     camera = scene.camera
     data = camera.data
+    _choose_lens(data, view)
     data.sensor_fit, data.sensor_width = "HORIZONTAL", SENSOR
     data.lens = SENSOR * fx / width
     data.shift_x = 0.5 - view["cx"] / width
     data.shift_y = (view["cy"] - height / 2) / width * fx / fy
     data.clip_start, data.clip_end = view["near"], view["far"]
     camera.matrix_world = camera_matrix(view["R"], view["center"])
+
+
+def _choose_lens(data, view):
+    """Set the type of the camera, and the properties that the type has besides a pinhole's."""
+    data.type = view["type"]
+    owner = data
+    if view["panorama"] is not None:
+        owner = data if hasattr(data, "panorama_type") else data.cycles  # before Blender 5
+        owner.panorama_type = view["panorama"]
+    for name, value in {**view["values"], **view["lengths"]}.items():
+        setattr(owner, name, value)
 
 
 def _set_border(scene, border, view):

@@ -75,9 +75,9 @@ def _key_lens(scene, views):
     for view in views:
         place_camera(scene, view)
         data = scene.camera.data
-        lenses.append((data.lens, data.shift_x, data.shift_y))
+        lenses.append((data.lens, data.ortho_scale, data.shift_x, data.shift_y))
     place_camera(scene, views[0])
-    for name, values in zip(("lens", "shift_x", "shift_y"), zip(*lenses, strict=True), strict=True):
+    for name, values in zip(("lens", "ortho_scale", "shift_x", "shift_y"), zip(*lenses, strict=True), strict=True):
         key(scene.camera.data, name, values)
 
 

@@ -72,4 +72,5 @@ class FileFrame:
             return request
         axes = [self.direction(axis) for axis in request["R"]]
         distances = {name: request[name] / self.unit for name in ("near", "far")}
-        return {**request, "R": axes, "center": self.point(request["center"]), **distances}
+        lengths = {name: length / self.unit for name, length in request.get("lengths", {}).items()}
+        return {**request, "R": axes, "center": self.point(request["center"]), "lengths": lengths, **distances}

@@ -1,4 +1,4 @@
-"""Lenses that Blender's camera lacks: pinhole pictures that cover the lens's rays are rendered, then sampled along these rays.
+"""Lenses that Blender's cameras lack: pinhole pictures that cover the lens's rays are rendered, then sampled along these rays.
 
 Labels are not affected: truth casts the lens's rays itself.
 """
@@ -49,8 +49,8 @@ FACES: tuple[tuple[tuple[int, int, int], ...], ...] = (
 
 
 @dataclass(frozen=True, eq=False)
-class _PinholeView:
-    """A covering pinhole picture: its `camera`, and the places where the rays of the lens's pixels meet it.
+class _View:
+    """A covering picture, of a camera that Blender has: its `camera`, and where the rays of the lens's pixels meet it.
 
     pixels (N,): indices of the lens's pixels that this picture serves; x, y (N,): the places of their rays in the picture, in
     its pixels. All three are None if the covering picture is the lens's picture, pixel by pixel.
@@ -62,14 +62,24 @@ class _PinholeView:
     y: Float | None = None
 
 
-def views_of(camera: Camera) -> tuple[_PinholeView, ...]:
-    """The covering pictures of a camera.
-
-    They are the camera's own picture for a pinhole without skew, a slightly wider one for a lens that bends rays slightly,
-    otherwise up to six sides of a cube.
+def is_rendered(camera: Camera, is_traced: bool) -> bool:
+    """Return whether Blender itself has such a camera: a pinhole or parallel rays without skew; with renderers that trace rays,
+    also panoramas.
     """
-    if camera.lens.is_linear and camera.intrinsics.skew == 0:
-        return (_PinholeView(camera),)
+    blender = camera.lens.blender
+    if blender is None:
+        return camera.lens.is_linear and camera.intrinsics.skew == 0
+    return is_traced or blender.panorama is None
+
+
+def views_of(camera: Camera, is_traced: bool) -> tuple[_View, ...]:
+    """The covering pictures of a camera; `is_traced`: for a renderer that traces rays, which has panoramas.
+
+    They are the camera's own picture if Blender has such a camera, a slightly wider pinhole's for a lens that bends rays
+    slightly, otherwise up to six sides of a cube.
+    """
+    if is_rendered(camera, is_traced):
+        return (_View(camera),)
     rays = pixel_rays(camera.intrinsics).reshape(-1, 3)
     seen_pixels = np.flatnonzero(np.isfinite(rays).all(axis=1))
     ahead = rays[seen_pixels]
@@ -85,17 +95,17 @@ def views_of(camera: Camera) -> tuple[_PinholeView, ...]:
     return tuple(views)
 
 
-def _view(camera: Camera, face: Float, pixels: NDArray[np.int64], rays: Float) -> _PinholeView:
+def _view(camera: Camera, face: Float, pixels: NDArray[np.int64], rays: Float) -> _View:
     """The smallest covering picture, with the axes `face`, through which these rays pass."""
     focal = FINER * max(camera.intrinsics.fx, camera.intrinsics.fy)
     x, y = focal * rays[:, 0] / rays[:, 2], focal * rays[:, 1] / rays[:, 2]
     left, top = math.floor(x.min()) - MARGIN, math.floor(y.min()) - MARGIN
     width, height = math.ceil(x.max()) + MARGIN - left, math.ceil(y.max()) + MARGIN - top
     pinhole = Intrinsics(width=width, height=height, fx=focal, fy=focal, cx=-left, cy=-top)
-    return _PinholeView(Camera(pinhole, face @ camera.R, face @ camera.t), pixels, x - left, y - top)
+    return _View(Camera(pinhole, face @ camera.R, face @ camera.t), pixels, x - left, y - top)
 
 
-def resampled(camera: Camera, views: Sequence[_PinholeView], pictures: Sequence[Float32], mixed: bool = True) -> Float32:
+def resampled(camera: Camera, views: Sequence[_View], pictures: Sequence[Float32], mixed: bool = True) -> Float32:
     """The lens's picture (H, W, C) float32, bilinear, or from the nearest pixels if not `mixed`; empty in pixels without a
     ray.
     """
@@ -126,6 +136,7 @@ class Sweeping:
     shot: Shot
     instant: int
     sensor: int
+    is_traced: bool
 
     @property
     def is_still(self) -> bool:
@@ -151,6 +162,6 @@ class Sweeping:
         return {"objects": objects, "camera": camera} if objects or camera else None
 
     def _camera(self, frame: FileFrame, view: int, moment: float) -> dict[str, Any]:
-        camera = views_of(self.shot.camera_during(self.instant, moment, self.sensor))[view].camera
+        camera = views_of(self.shot.camera_during(self.instant, moment, self.sensor), self.is_traced)[view].camera
         request = {"R": camera.R.tolist(), "center": camera.center.tolist(), "near": 1.0, "far": 1.0}
         return {name: value for name, value in frame.camera(request).items() if name in ("R", "center")}

@@ -15,6 +15,7 @@ from viewsphere.assets.animation.deforming import Load
 from viewsphere.codecs.png_tiff import encode_png
 from viewsphere.codecs.srgb import encoded
 from viewsphere.engines.shared.blender.file_frame import FileFrame
+from viewsphere.engines.shared.blender.lens import is_rendered
 from viewsphere.engines.shared.blender.requests import members_of
 from viewsphere.engines.shared.blender.staging import STAGE_SECONDS, Arrangement, build_stage, camera_request
 from viewsphere.geometry.camera import orbit_angles
@@ -160,7 +161,7 @@ def _lacking(samples: Sequence[Sample], finishes: Sequence[Finish], off: float) 
     """Lines about lens and picture properties that the .blend file lacks; `off` is the camera's error in distances."""
     if off > MOST_OFF:
         yield f"the camera is off by up to {off:.1g} of its distance: Blender's numbers are single, the origin far"
-    if any(not sample.camera.lens.is_linear or sample.camera.intrinsics.skew for sample in samples):
+    if not all(is_rendered(sample.camera, is_traced=True) for sample in samples):
         yield "Blender's camera has no such distortion or skew: a pinhole of the same focal lengths and centre takes its place"
     if any(any(steps_of(f.effects)) or f.smoother.kind != "none" for f in finishes):
         yield "scene.effects and scene.smoother are not in the file: viewsphere does them to the finished picture"

@@ -20,13 +20,14 @@ from viewsphere.engines.shared.arranged import Arrangements
 from viewsphere.engines.shared.blender.backdrop import Backdrop, lay_sky, veil
 from viewsphere.engines.shared.blender.border import border_of
 from viewsphere.engines.shared.blender.file_frame import FileFrame
-from viewsphere.engines.shared.blender.lens import Sweeping, resampled, views_of
+from viewsphere.engines.shared.blender.lens import Sweeping, is_rendered, resampled, views_of
 from viewsphere.engines.shared.blender.options import AnyOptions, options_of
 from viewsphere.engines.shared.blender.requests import Request, kinds_of, materials_request, members_of, scene_request, staged
 from viewsphere.engines.shared.blender.scripts import script_request
 from viewsphere.engines.shared.blender.texels import Kind, Levels
 from viewsphere.engines.shared.passes import shading_of
 from viewsphere.errors import BlenderDied, BlenderError, ModelError, RecipeError, UserError
+from viewsphere.geometry.lenses import BlenderLens
 from viewsphere.model.channel import LIGHT_PASSES, MATERIAL_PASSES, lacks_background, painted_together
 from viewsphere.model.sensors.camera import Camera
 from viewsphere.model.shot import Shot
@@ -200,7 +201,7 @@ class CyclesStage:
         The light of a sharp picture is split during its rendering; for a blurred one, it is rendered again. A Blender that dies
         or hangs is restarted once. Raises ModelError if it dies again, UserError for an unreadable background image.
         """
-        sweeping, painted = Sweeping(self.shot, instant, sensor), dict[str, NDArray[Any]]()
+        sweeping, painted = self._sweeping(instant, sensor), dict[str, NDArray[Any]]()
         is_lit = not set(names).isdisjoint(LIGHT_PASSES)
         for group in painted_together(names):
             wanted = ("light",) if is_lit and "light" not in painted and sweeping.is_still else ()
@@ -225,7 +226,7 @@ class CyclesStage:
         is_open = not shows_sky(finish.background)
         fog = self.shot.scene.fog or self.shot.scene.fog_outdoors
         is_open = is_open or fog is not None  # whose sky is laid behind things that it has veiled
-        rendered = arranged.painted(camera, is_open, visibility, Sweeping(self.shot, instant, sensor), wanted)
+        rendered = arranged.painted(camera, is_open, visibility, self._sweeping(instant, sensor), wanted)
         if fog is not None:
             veil(rendered["picture"], fog, camera, arranged.geometry, is_outdoors=self.shot.scene.fog is None)
             if shows_sky(finish.background):
@@ -235,6 +236,9 @@ class CyclesStage:
         focus, owner = np.array(self.shot.instants[instant].focus), arranged.geometry.triangle_object
         seen = partial(seen_by, camera, focus, visibility.inverse_depth, visibility.triangle, owner)
         return rendered | pictures(names, rendered["picture"], background, finish, seen)
+
+    def _sweeping(self, instant: int, sensor: int) -> Sweeping:
+        return Sweeping(self.shot, instant, sensor, not self.options.uses_opengl)
 
     def _light(self, instant: int, sensor: int, visibility: Visibility, light: Float32) -> dict[str, Float32]:
         """Return all `LIGHT_PASSES` of the rendered light, without shadow catchers, which Cycles counts in the albedo."""
@@ -331,7 +335,7 @@ class Arrangement:
     def _rendered(
         self, camera: Camera, is_open: bool, clip: Clip, sweeping: Sweeping | None, wanted: Sequence[str]
     ) -> dict[str, Float32]:
-        views = views_of(camera)
+        views = views_of(camera, not self.options.uses_opengl)
         process = self.keeper.process_for(self, self._levels([view.camera for view in views]))
         swept = (sweeping and sweeping.request(i) for i in range(len(views)))
         both = zip(views, swept, strict=True)
@@ -345,7 +349,7 @@ class Arrangement:
         self, process: BlenderProcess, camera: Camera, is_open: bool, clip: Clip, blur: Request | None, wanted: Sequence[str]
     ) -> dict[str, Float32]:
         is_empty = is_open and blur is None and self.shot.scene.ground is None and self.shot.scene.blend is None
-        border = border_of(self.geometry, camera) if is_empty else None
+        border = border_of(self.geometry, camera) if is_empty and camera.lens.is_linear else None
         if border is not None and (border[0] >= border[2] or border[1] >= border[3]):
             shape = camera.height, camera.width
             return {name: np.zeros((*shape, COMPONENTS[name]), np.float32) for name in ("picture", *wanted)}
@@ -406,8 +410,10 @@ def clip_of(visibility: Visibility, geometry: Geometry, camera: Camera) -> Clip:
 
 
 def camera_request(camera: Camera, clip: Clip = (NEAREST, FARTHEST)) -> dict[str, Any]:
-    """A pinhole camera without skew, in the form that the worker's `render` takes."""
+    """A camera that Blender has, in the form that the worker's `render` takes; a pinhole instead of other lenses."""
+    blender = camera.lens.blender or BlenderLens("PERSP")
     return {
+        **blender._asdict(),
         **{name: getattr(camera.intrinsics, name) for name in ("width", "height", "fx", "fy", "cx", "cy")},
         "R": camera.R.tolist(),
         "center": camera.center.tolist(),
@@ -440,7 +446,7 @@ def indices(shot: Shot, instant: int, sensor: int, load: Load) -> NDArray[np.int
     cannot build the scene.
     """
     camera = shot.camera(instant, sensor)
-    if not camera.lens.is_linear or camera.intrinsics.skew:
+    if not is_rendered(camera, is_traced=True):
         return None
     python = shot.engine_options.get("python") if shot.engine == "cycles" else None
     options = {"python": python, "samples": 1, "bounces": 0, "denoise": "off", "settings": _SHARP}

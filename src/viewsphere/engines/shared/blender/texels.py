@@ -110,6 +110,17 @@ class _Density:
         return min(int(math.log2(spare)), MOST) if spare >= 1 else 0
 
 
+def _finest(camera: Camera) -> float:
+    """Most pixels in a radian along the middle row and the middle column of a panorama. Near its poles, where columns are
+    closer, its rows limit what can be seen.
+    """
+    w, h = camera.width, camera.height
+    strips = (0, h // 2, w, h // 2 + 1), (w // 2, 0, w // 2 + 1, h)
+    rays = [camera.lens.directions(1, strip).reshape(-1, 3) for strip in strips]
+    steps = np.concatenate([np.linalg.norm(np.diff(strip, axis=0), axis=1) for strip in rays])
+    return 1 / float(steps.min(initial=1.0))
+
+
 def _edges(corners: Float) -> Float:
     """Two edges (T, 2, N) of triangles (T, 3, N)."""
     return corners[:, 1:] - corners[:, :1]
@@ -153,17 +164,21 @@ class Kind:
         return np.array(middles), float(np.linalg.norm(high - low)) / 2
 
     def levels(self, cameras: Sequence[Camera]) -> Levels:
-        """Halvings for a frame that is made of these pinhole cameras' pictures."""
+        """Halvings for a frame that is made of these cameras' pictures."""
         pixels = max(map(self._pixels, cameras))
         return tuple(self._material_levels(index, pixels) for index in range(len(self.mesh.materials)))
 
     def _pixels(self, camera: Camera) -> float:
-        """Maximum pixels of a pinhole's picture on a metre of the model, at any rotation; inf if the camera is inside a ball
-        around a model.
+        """Maximum pixels of a picture on a metre of the model, at any rotation; inf if the camera is inside a ball around a
+        model.
         """
         middles, radius = self.balls
         nearest = float(np.linalg.norm(middles - camera.center, axis=1).min()) - radius
         k = camera.intrinsics
+        if camera.lens.is_parallel:
+            return max(k.fx, k.fy)
+        if not camera.lens.is_linear:
+            return _finest(camera) / nearest if nearest > 0 else math.inf
         slope = math.hypot(max(k.cx, k.width - k.cx) / k.fx, max(k.cy, k.height - k.cy) / k.fy)  # of a corner's ray
         return max(k.fx, k.fy) * (1 + slope**2) / nearest if nearest > 0 else math.inf
 

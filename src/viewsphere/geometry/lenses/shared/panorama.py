@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated, Any
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -82,6 +82,24 @@ def panorama_functions(limit: float, is_cylinder: bool) -> dict[str, Any]:
         "period": _period,
         "field_of_view": _field_of_view,
     }
+
+
+class _Sides(NamedTuple):
+    """The ends of a picture in the units to which K applies: radians across; radians or tangents down."""
+
+    left: float
+    right: float
+    top: float
+    bottom: float
+
+
+def sides(lens: Lens) -> _Sides | None:
+    """The ends of a picture whose middle column may be off the axis; None if it is skewed or ends beyond half a turn."""
+    i = lens.intrinsics
+    left, right = -i.cx / i.fx, (i.width - i.cx) / i.fx
+    if i.skew or max(-left, right) > math.pi + CLOSED:
+        return None
+    return _Sides(max(left, -math.pi), min(right, math.pi), -i.cy / i.fy, (i.height - i.cy) / i.fy)
 
 
 def _period(lens: Lens) -> int | None:
