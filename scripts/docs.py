@@ -39,7 +39,7 @@ from viewsphere.labels import (
     on_request,
 )
 from viewsphere.limits import table
-from viewsphere.model.channel import ALL_PICTURES, PASSES
+from viewsphere.model.channel import FINISHED, PASSES
 from viewsphere.plugins.effect import EffectSpec
 from viewsphere.plugins.engine import EngineSpec
 from viewsphere.plugins.format import FormatSpec
@@ -149,7 +149,7 @@ def field_row(label: ObjectLabel | SampleLabel, field: Field) -> str:
 def proofs_page() -> str:
     """Each label and pass with what proves it; stops where figures or pictures are not those of the labels that there are."""
     rows = {name: unit_of(label) for name, label in labels().items()}
-    rows |= {name: channel.unit for name, channel in PASSES.items() if name not in ALL_PICTURES}
+    rows |= {name: channel.unit for name, channel in PASSES.items() if name not in FINISHED}
     proofs, costs = (json.loads((DOCS / "labels.json").read_text("utf-8"))[name] for name in ("proofs", "costs"))
     pictures = {path.stem for path in (DOCS / LABEL_PICTURES).glob("*.jpg")}
     tests = {proof["test"] for found in proofs.values() for proof in found}

@@ -7,7 +7,7 @@ from small import ROOT
 from viewsphere import Recipe, generate
 from viewsphere.check import check
 from viewsphere.labels import channels, drawable, labels, on_request
-from viewsphere.model.channel import DEEP_PICTURES, DEFAULT_CHANNELS
+from viewsphere.model.channel import DEFAULT_CHANNELS, FINISHED
 from viewsphere.preview.frame import draw_sample
 from viewsphere.store import Dataset
 
@@ -64,5 +64,5 @@ def test_every_label_that_can_be_asked_for_has_a_recipe_and_every_label_a_drawin
     shown = [Recipe.load(file) for file in RECIPES]
     assert on_request().keys() <= {name for recipe in shown for name in recipe.annotations}
     followed = {"tracks"} if any(recipe.tracks for recipe in shown) else set()
-    assert channels().keys() - {"rgba", *DEEP_PICTURES} <= {name for recipe in shown for name in recipe.channels} | followed
+    assert channels().keys() - {*FINISHED} <= {name for recipe in shown for name in recipe.channels} | followed
     assert labels().keys() <= drawable().keys()

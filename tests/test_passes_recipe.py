@@ -11,11 +11,11 @@ import viewsphere as vs
 from small import ROOT
 from viewsphere.check import check
 from viewsphere.check.frames.comparing import files
-from viewsphere.model.channel import ALL_PICTURES, PASSES
+from viewsphere.model.channel import FINISHED, PASSES
 from viewsphere.preview.frame import draw_sample
 from viewsphere.report.pictures import SCALES, layers
 
-NAMES = [name for name in PASSES if name not in ALL_PICTURES]
+NAMES = [name for name in PASSES if name not in FINISHED]
 
 
 @pytest.fixture(scope="module")

@@ -259,7 +259,7 @@ def test_engines_that_do_not_paint_a_pass_say_so_before_rendering(engine):
     )
     with pytest.raises(
         RecipeError,
-        match=rf"channels\[1\]: expected a label, or what engine: {engine} paints \(rgb, rgba, rgb16, rgb_linear\); found",
+        match=rf"channels\[1\]: expected a label, or what engine: {engine} paints \(rgb, rgba, rgb16, rgb_linear, bayer\)",
     ):
         plan(recipe)
 

@@ -189,6 +189,7 @@ def test_all_parts_of_a_scene_have_an_entry():
     parts = {kind for kind in vars(scene).values() if isinstance(kind, type) and issubclass(kind, Frozen)}
     assert parts - derived == {
         *(Frozen, OmitNone, ProceduralMaterial),  # what they are made of
+        scene.MountedImager,  # which is a camera's
         *(scene.Finish, scene.BlendScene, scene.Floor, scene.Scene),
         scene.Effects,  # whose fields are those of plug-ins
     }

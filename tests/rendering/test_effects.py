@@ -41,7 +41,8 @@ def seen(inverse_depth=0.2, targets=None, distance=5.0) -> Seen:
 
 def apply_effects(picture, effects, known: Seen) -> np.ndarray:
     """The picture with the effects on light."""
-    for step in steps_of(effects)[0]:
+    steps = steps_of(effects)
+    for step in (*steps.before, *steps.after):
         picture = step(picture, lambda: known)
     return picture
 
@@ -67,9 +68,9 @@ def moments(plane: np.ndarray) -> tuple[float, float, float, float, float]:
 
 
 def test_strength_0_is_the_same_array():
-    assert steps_of(Effects()) == steps_of(Effects(seed=3, focus=2.0, motion_angle_deg=45, blur=0.0)) == ([], [])
-    light, coded = steps_of(Effects(jpeg=0.5))
-    assert (len(light), len(coded)) == (0, 1)
+    assert steps_of(Effects()) == steps_of(Effects(seed=3, focus=2.0, motion_angle_deg=45, blur=0.0)) == ([], [], [])
+    before, after, coded = steps_of(Effects(jpeg=0.5))
+    assert (before, after, len(coded)) == ([], [], 1)
 
 
 @pytest.mark.parametrize("channels", [3, 4])
@@ -322,7 +323,7 @@ def test_lines_lie_on_borders_and_creases_of_targets_only():
 
 
 def jpeg(pixels, strength):
-    for step in steps_of(Effects(jpeg=strength))[1]:
+    for step in steps_of(Effects(jpeg=strength)).coded:
         pixels = step(pixels, seen)
     return pixels
 

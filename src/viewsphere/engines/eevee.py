@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from viewsphere.engines.shared import blender as _blender
 from viewsphere.engines.shared.blender import PROGRAMS, stage
-from viewsphere.model.channel import ALL_PICTURES
+from viewsphere.model.channel import FINISHED
 from viewsphere.plugins.engine import EngineSpec
 
 if TYPE_CHECKING:
@@ -28,5 +28,5 @@ ENGINE = EngineSpec(
     catches_shadows=False,
     parallel_rays=True,
     programs=PROGRAMS,
-    paints=ALL_PICTURES,
+    paints=FINISHED,
 )

@@ -53,6 +53,7 @@ PASSES: dict[str, Channel] = {
         Channel("rgba", np.uint8, 4, "sRGB", 0, "png", "colour picture without its background; straight alpha"),
         Channel("rgb16", np.uint16, 3, "sRGB", 0, "png", "colour picture in 65,536 levels, without JPEG's traces"),
         Channel("rgb_linear", np.float32, 3, "scene-linear", 0, "tiff", "light of the picture, before exposure and finish"),
+        Channel("bayer", np.uint16, 1, "DN", 0, "png", "digital numbers of the camera's imager, a pixel a colour filter"),
         Channel("albedo", np.float32, 3, "1", 0, "tiff", "share of the light that the surface scatters to all sides"),
         Channel("shading", np.float32, 3, "scene-linear", 0, "tiff", "scattered light without the surface's colour"),
         Channel("residual", np.float32, 3, "scene-linear", 0, "tiff", "all other light: mirrored, let through, emitted, sky"),
@@ -72,6 +73,12 @@ DEEP_PICTURES = ("rgb16", "rgb_linear")
 ALL_PICTURES = (*PICTURES, *DEEP_PICTURES)
 """The passes that are pictures. The first that a data set keeps is its samples' picture."""
 
+MOSAIC = "bayer"
+"""The pass that a camera's imager measures, before its colours are interpolated."""
+
+FINISHED = (*ALL_PICTURES, MOSAIC)
+"""The passes that a finish makes of a picture's light, which engines need not know."""
+
 
 LIGHT_PASSES = ("albedo", "shading", "residual", "emission")
 """Parts of a picture's light, sampled like the picture: albedo x shading + residual is the picture before exposure."""
@@ -88,8 +95,8 @@ def picture_of(kept: Container[str]) -> str | None:
 
 
 def painted_together(names: Container[str]) -> tuple[tuple[str, ...], ...]:
-    """The pictures among the names, those of one light together: first all with the background, then `rgba`."""
-    groups = (("rgb", *DEEP_PICTURES), ("rgba",))
+    """The finished passes among the names, those of one light together: first all with the background, then `rgba`."""
+    groups = (("rgb", *DEEP_PICTURES, MOSAIC), ("rgba",))
     return tuple(wanted for group in groups if (wanted := tuple(name for name in group if name in names)))
 
 

@@ -15,6 +15,7 @@ from viewsphere.model.annotations.procedural_material import ProceduralMaterial
 from viewsphere.model.fields.frozen import Frozen
 from viewsphere.model.fields.numbers import Amount, Length, Metres, Number, Portion, Signed, Strength
 from viewsphere.model.fields.omit_none import OmitNone
+from viewsphere.model.sensors.imager import MountedImager
 from viewsphere.model.weather import Fog, Lamps, Rain, Snow, Wet
 from viewsphere.validation.errors import shown
 
@@ -247,13 +248,19 @@ class Effects(Frozen):
         return cast(int, self.values.get(SEED, 0))
 
 
-class Finish(Frozen):
-    """The steps from light to a picture that need no new stage, so that every frame may have its own."""
+class Finish(OmitNone):
+    """The steps from light to a picture that need no new stage, so that every frame may have its own.
+
+    `imager` is that of the sensor whose picture is finished: `Shot.finish` adds it.
+    """
+
+    OMIT_IF_NONE = ("imager",)
 
     background: Background = Background.of_defaults()
     smoother: Smoother = Smoother.of_defaults()
     view: ViewTransform = ViewTransform.of_defaults()
     effects: Effects = Effects.of_defaults()
+    imager: MountedImager | None = None
 
     def with_noise_of(self, sensor: str) -> Finish:
         """The same finish, with noise that also follows from a sensor's name; without noise it is unchanged."""

@@ -177,8 +177,9 @@ class Shot(Frozen):
 
         The rig's first sensor has the instant's noise; the name of every other sensor gives it noise of its own.
         """
-        finish = self.instants[instant].finish or self.scene.finish
-        return finish.with_noise_of(self.rig.sensors[sensor].name) if sensor else finish
+        finish, mounted = self.instants[instant].finish or self.scene.finish, self.rig.sensors[sensor]
+        finish = finish.with_noise_of(mounted.name) if sensor else finish
+        return finish if mounted.imager is None else finish.model_copy(update={"imager": mounted.imager})
 
     @property
     def stage_key(self) -> str:

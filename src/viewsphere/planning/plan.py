@@ -48,6 +48,7 @@ from viewsphere.planning.checks.warnings import doubtful_views, unlit
 from viewsphere.planning.clips import with_clips
 from viewsphere.planning.credits import credits_of, unlicensed
 from viewsphere.planning.engine_digest import engine_options, script_digest
+from viewsphere.planning.imagers import check_imager
 from viewsphere.planning.models import categories, left_out, numbered_specs
 from viewsphere.planning.rigs import rig_of, with_distances
 from viewsphere.planning.samplers import SamplingContext, Standing, lens
@@ -433,6 +434,7 @@ def plan(recipe: Recipe | str | PathLike[str], shot_frames: int | None = None) -
     recipe = Recipe.ensure(recipe)
     with recipe.located():
         check_recipe(recipe)
+        check_imager(recipe)
         views = poses_of(recipe.viewpoints, recipe.time, recipe.seed, recipe.folder)
         own = lens(recipe, views)
         rig = rig_of(recipe, own)

@@ -17,6 +17,9 @@ Stage = Literal["objects", "lens", "sensor", "computer", "file"]
 STAGES: tuple[Stage, ...] = get_args(Stage)
 """The parts of a camera's light path, in its order."""
 
+BEFORE_SENSOR: tuple[Stage, ...] = ("objects", "lens")
+"""The stages whose light reaches the sensor."""
+
 RESERVED = ("draw", SEED)
 """Names that a recipe or a shot has beside those of effects."""
 
@@ -49,7 +52,8 @@ class EffectSpec(Spec):
     apply: Callable[[Any, Any, Any], Any] = Field(
         description="`apply(picture, options, context)`: the changed picture, a new array of the same shape and type, for "
         "options without distributions and a `viewsphere.rendering.effects.EffectContext`. Pictures are display-linear float32 "
-        "from 0 to 1, (H, W, 3), or (H, W, 4) premultiplied; in the stage `file` they are uint8 sRGB with straight alpha"
+        "from 0 to 1, (H, W, 3), or (H, W, 4) premultiplied; in the stage `file` they are uint8 sRGB with straight alpha. "
+        "Beside an imager, `objects` and `lens` get light of 0 and more, of which 1 saturates the sensor"
     )
     is_noisy: bool = Field(
         default=False,
@@ -65,6 +69,9 @@ class EffectSpec(Spec):
     )
     needs_pinhole: bool = Field(
         default=False, description="whether it follows from a pinhole's distances; pictures with parallel rays refuse it"
+    )
+    in_imager: bool = Field(
+        default=False, description="whether a camera's imager has it, too; recipes with an imager refuse it"
     )
     record: int | None = Field(
         default=None,

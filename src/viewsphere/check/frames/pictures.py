@@ -35,7 +35,7 @@ def pictures(sample: Sample) -> Iterator[str]:
     finish = sample.finish
     if finish is None or sum(name in sample.channels for name in ALL_PICTURES) < 2:
         return
-    is_exact = sample.files.get("rgb", "").endswith(LOSSLESS) and not steps_of(finish.effects)[1]
+    is_exact = sample.files.get("rgb", "").endswith(LOSSLESS) and not steps_of(finish.effects).coded
     words = bytes_of_words(sample.channels["rgb16"]) if "rgb16" in sample.channels else None
     if words is not None and is_exact:
         yield from _outside("rgb", sample.channels["rgb"], "rgb16", words, words)

@@ -53,8 +53,8 @@ from viewsphere.recipe.world.surface import GroundEntry, MaterialEntry
 _DAY_0 = 1721424.5
 """Julian day of midnight before day 0 of Python's calendar."""
 
-PARTS = tuple(Finish.model_fields)
-"""The parts of a finish, which have the same names in a recipe's scene."""
+PARTS = ("background", "smoother", "view", "effects")
+"""The parts of a finish that are drawn, which have the same names in a recipe's scene."""
 
 WEATHER = frozenset({"rain", "snow", "wet"})
 """Fields of a scene whose drops, flakes and puddles have random places."""
@@ -88,10 +88,15 @@ class Scenes:
     @cached_property
     def has_finish_per_frame(self) -> bool:
         """Return whether every frame has a finish of its own."""
-        return self.recipe.scene.effects.is_noisy or any(
+        return self._is_noisy or any(
             self._draw(part) == "per_frame" and (is_random(part) or getattr(part, "images", None) is not None)
             for part in self._finishing
         )
+
+    @property
+    def _is_noisy(self) -> bool:
+        """Return whether pictures have noise, which differs in every frame: that of effects, or of an imager."""
+        return self.recipe.scene.effects.is_noisy or self.recipe.camera.imager is not None
 
     def scene(self, model: str, pose: str) -> Scene:
         """Light and ground for a shot, and the finish that its frames share."""
@@ -230,7 +235,7 @@ class Scenes:
 
     def _finish(self, names: tuple[Names, ...], frame: Names) -> Finish:
         parts = {name: self._part(name, drawn_for) for name, drawn_for in zip(PARTS, names, strict=True)}
-        if self.recipe.scene.effects.is_noisy:
+        if self._is_noisy:
             of = (*frame, self.variation) if self.variation else frame
             seed = int(share(self.recipe.seed, "noise", *of) * 2**32)
             parts["effects"] = parts["effects"].model_copy(update={SEED: seed})

@@ -13,6 +13,7 @@ from viewsphere.model.fields.frozen import Frozen
 from viewsphere.model.fields.omit_none import OmitNone
 from viewsphere.model.scene import IDENTITY, Matrix4
 from viewsphere.model.sensors.camera import Intrinsics
+from viewsphere.model.sensors.imager import MountedImager
 from viewsphere.model.sensors.lidar import LIDAR, Lidar
 
 CAMERA = "camera"
@@ -22,16 +23,17 @@ CAMERA = "camera"
 class Sensor(OmitNone):
     """A camera or a LiDAR of a rig: its lens and its mounting. `rig_from_sensor` is rigid, OpenCV axes on both sides, metres.
     `channels` are the channels of the shot that it keeps; None: all but points for a camera, points alone for a LiDAR. `lidar`
-    holds the measurement settings; None for a camera.
+    holds the measurement settings; None for a camera. `imager` is the sensor behind a camera's lens, None for a perfect one.
     """
 
-    OMIT_IF_NONE = ("channels", "lidar")
+    OMIT_IF_NONE = ("channels", "lidar", "imager")
 
     intrinsics: Intrinsics
     name: str = Field(default=CAMERA, pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]*$", max_length=64)
     rig_from_sensor: Matrix4 = IDENTITY
     channels: tuple[str, ...] | None = None
     lidar: Lidar | None = None
+    imager: MountedImager | None = None
 
     def kept_channels(self, channels: tuple[str, ...]) -> tuple[str, ...]:
         """Return the channels of a shot that the sensor keeps, in the shot's order."""

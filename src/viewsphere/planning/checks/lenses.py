@@ -93,6 +93,9 @@ def _of_full_turns(recipe: Recipe, sensor: str) -> Iterator[tuple[str, str]]:
                 f"expected none, as it would show the seam of a full turn, which {sensor} has; found {found}: leave it out, or "
                 "set a smaller span",
             )
+    if recipe.camera.imager is not None:
+        reason = f"expected none, as its lens and its mosaic would show the seam of a full turn, which {sensor} has"
+        yield "camera.imager", f"{reason}; found one: leave it out, or set a smaller span"
     if recipe.time is not None and recipe.time.shutter:
         reason = f"expected 0, as motion blur would show the seam of {sensor}; found {recipe.time.shutter:g}: leave it out"
         yield "time.shutter", reason

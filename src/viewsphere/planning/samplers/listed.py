@@ -17,6 +17,7 @@ from viewsphere.model.scene import IDENTITY
 from viewsphere.model.sensors.rig import Rig
 from viewsphere.model.shot import Shot
 from viewsphere.model.thing import Motion, Thing
+from viewsphere.planning.imagers import with_imager
 from viewsphere.planning.samplers import SamplingContext, Standing
 from viewsphere.plugins.sampler import SamplerSpec
 from viewsphere.recipe.cameras.viewpoints import PoseList
@@ -99,7 +100,7 @@ def _shot(context: SamplingContext, subject: str, poses: Sequence[int], box_of: 
     if context.own_rig is not None or lens is None:
         return context.finished(key, first, things, scene, [now])
     finished = context.finished(key, first, things, scene, [now.model_copy(update={"intrinsics": None})])
-    return finished.model_copy(update={"rig": Rig.single(lens)})
+    return finished.model_copy(update={"rig": with_imager(context.recipe, Rig.single(lens))})
 
 
 def _things(context: SamplingContext, shot: Arranged) -> tuple[Thing, ...]:

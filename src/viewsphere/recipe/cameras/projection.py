@@ -75,6 +75,8 @@ class WithProjection(Frozen):
     """
 
     LENS: ClassVar[tuple[str, ...]] = ()
+    OMIT_IF_NONE: ClassVar[tuple[str, ...]] = ()
+    """Fields that are written only if they are set, so that they change no digest of recipes without them."""
 
     projection: ProjectionField | None = Field(
         default=None,
@@ -119,6 +121,9 @@ class WithProjection(Frozen):
     def _beside_the_name(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
         plain: dict[str, Any] = handler(self)
         options = plain.pop("projection", None)
+        for name in self.OMIT_IF_NONE:
+            if plain.get(name) is None:
+                plain.pop(name, None)
         return plain | options if options else plain
 
     @classmethod

@@ -25,6 +25,7 @@ from viewsphere.model.fields.frozen import Frozen
 from viewsphere.model.fields.numbers import Count, Number, Positive
 from viewsphere.model.scene import WEATHER
 from viewsphere.model.sensors.camera import Intrinsics
+from viewsphere.recipe.cameras.imager import ImagerField
 from viewsphere.recipe.cameras.lens import DistortionField
 from viewsphere.recipe.cameras.projection import WithProjection
 from viewsphere.recipe.draws import Drawn, alternatives, is_random
@@ -127,11 +128,18 @@ class CameraEntry(WithProjection):
     of_viewpoints: Literal[True] | None = Field(
         default=None, description="true: size and lens from the viewpoints' file (nerfstudio, COLMAP)"
     )
+    imager: ImagerField | None = Field(
+        default=None,
+        description="sensor behind the lens: phone, webcam, machine_vision, drone, or a mapping of preset and other fields; by "
+        "default a perfect one",
+    )
+
+    OMIT_IF_NONE = ("imager",)
 
     @model_validator(mode="before")
     @classmethod
     def _default_lens(cls, data: Any) -> Any:
-        return {"fov_deg": 40.0, **data} if isinstance(data, dict) and not data.keys() - {"size"} else data
+        return {"fov_deg": 40.0, **data} if isinstance(data, dict) and not data.keys() - {"size", "imager"} else data
 
     @field_validator("sensor_mm", mode="before")
     @classmethod

@@ -11,7 +11,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Iterable
 from functools import lru_cache, partial
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,7 +21,7 @@ from viewsphere.errors import PluginError
 from viewsphere.model.fields.frozen import Frozen
 from viewsphere.model.scene import SEED, Effects
 from viewsphere.plugin_modules import Changes, changes
-from viewsphere.plugins.effect import EffectSpec
+from viewsphere.plugins.effect import BEFORE_SENSOR, EffectSpec
 from viewsphere.rendering.seen import Seen
 from viewsphere.validation.errors import read_options
 
@@ -59,8 +59,16 @@ class EffectContext:
         return self._seed
 
 
-def steps_of(effects: Effects) -> tuple[list[Step], list[Step]]:
-    """The effects that are on, in the order of the light path: those of display-linear light, and those of coded bytes.
+class Steps(NamedTuple):
+    """The effects that are on, in the order of the light path: before the sensor, after it, and of coded bytes."""
+
+    before: list[Step]
+    after: list[Step]
+    coded: list[Step]
+
+
+def steps_of(effects: Effects) -> Steps:
+    """The effects that are on.
 
     Raises UserError for effects of unknown names, and for strengths and options that are not valid.
     """
@@ -74,12 +82,12 @@ def steps_of(effects: Effects) -> tuple[list[Step], list[Step]]:
     first = dict[Any, EffectSpec]()
     for spec in found:
         first.setdefault((spec.apply, spec.options), spec)
-    on_light, on_bytes = list[Step](), list[Step]()
+    steps = Steps([], [], [])
     for spec in first.values():
         options = read_options(spec.options, {k: values[k] for k in spec.options.model_fields if k in values}, "scene.effects")
         step = partial(_apply, spec, options, effects.seed if spec.is_noisy else None)
-        (on_bytes if spec.stage == "file" else on_light).append(step)
-    return on_light, on_bytes
+        (steps.before if spec.stage in BEFORE_SENSOR else steps.coded if spec.stage == "file" else steps.after).append(step)
+    return steps
 
 
 @lru_cache(maxsize=64)

@@ -8,9 +8,9 @@ from pydantic import Field
 
 from viewsphere.model.fields.frozen import Frozen
 from viewsphere.model.fields.numbers import Portion
-from viewsphere.model.sensors.camera import Intrinsics
 from viewsphere.plugins.effect import EffectSpec
 from viewsphere.rendering.effects import EffectContext
+from viewsphere.rendering.scaling import scaled
 
 Float32 = NDArray[np.float32]
 
@@ -32,23 +32,10 @@ def _apply(picture: Float32, options: _ChromaticAberration, context: EffectConte
     out = picture.copy()
     for channel, sign in ((0, 1), (2, -1)):
         scale = 1 + sign * SPLIT * options.chromatic_aberration
-        out[..., channel] = _scaled(picture[..., channel], scale, intrinsics)
+        out[..., channel] = scaled(picture[..., channel], scale, intrinsics)
         if picture.shape[2] == 4:
-            np.maximum(out[..., 3], _scaled(picture[..., 3], scale, intrinsics), out=out[..., 3])
+            np.maximum(out[..., 3], scaled(picture[..., 3], scale, intrinsics), out=out[..., 3])
     return out
-
-
-def _scaled(plane: Float32, scale: float, intrinsics: Intrinsics) -> Float32:
-    """The plane (H, W) enlarged about the principal point, bilinear; its border pixels extend outwards without end."""
-    for axis, center in ((0, intrinsics.cy), (1, intrinsics.cx)):
-        size = plane.shape[axis]
-        at = np.clip((np.arange(size) + 0.5 - center) / scale + center - 0.5, 0, size - 1)
-        first = np.minimum(at.astype(np.int64), max(size - 2, 0))
-        weight = (at - first).astype(np.float32)
-        weight = weight[:, None] if axis == 0 else weight
-        low = plane.take(first, axis)
-        plane = low + (plane.take(np.minimum(first + 1, size - 1), axis) - low) * weight
-    return plane
 
 
 EFFECT = EffectSpec(
@@ -59,5 +46,6 @@ EFFECT = EffectSpec(
     order=40,
     apply=_apply,
     shows_seam=True,
+    in_imager=True,
     record=5,
 )

@@ -57,6 +57,7 @@ EFFECTS = (
         order=10,
         apply=_apply,
         is_noisy=True,
+        in_imager=True,
         record=11,
     ),
     EffectSpec(
@@ -67,6 +68,7 @@ EFFECTS = (
         order=20,
         apply=_apply,
         is_noisy=True,
+        in_imager=True,
         record=12,
     ),
 )

@@ -45,5 +45,6 @@ EFFECT = EffectSpec(
     order=50,
     apply=_apply,
     shows_seam=True,
+    in_imager=True,
     record=4,
 )

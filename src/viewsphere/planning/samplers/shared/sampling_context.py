@@ -36,6 +36,7 @@ from viewsphere.model.shot import Shot
 from viewsphere.model.thing import Thing, TimeStep
 from viewsphere.planning.clips import shown_steps
 from viewsphere.planning.engine_digest import engine_options
+from viewsphere.planning.imagers import with_imager
 from viewsphere.planning.splits import dealt, drawn_split, shared
 from viewsphere.recipe.draws import drawn
 from viewsphere.recipe.recipe import Recipe, Splits
@@ -100,7 +101,7 @@ class SamplingContext(Sendable):
     @cached_property
     def rig(self) -> Rig:
         """The sensors of all shots."""
-        return self.own_rig or Rig.single(lens(self.recipe, self.pose_list))
+        return with_imager(self.recipe, self.own_rig or Rig.single(lens(self.recipe, self.pose_list)))
 
     @property
     def intrinsics(self) -> Intrinsics:
