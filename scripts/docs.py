@@ -266,8 +266,8 @@ def asset_sets_page() -> str:
     text = "\n| Source | Set and layout | Category | Axes and unit | Licence | Tried on |\n|---|---|---|---|---|---|\n"
     for name, source in sorted(sources().items()):
         if (found := source.folder) is not None and not plugins.is_third_party("sources", name):
-            tried = "files of the set" if found.is_tried else "made trees only"
-            row = (f"`{name}:`", f"{found.title}: `{found.layout}`", found.category, found.axes, found.licence, tried)
+            what = f"{found.title}: `{found.layout}`"
+            row = (f"`{name}:`", what, found.category, found.axes, found.licence, found.tried)
             text += f"| {' | '.join(row)} |\n"
     return SETS.sub(lambda found: found[1] + text, (DOCS / "asset-sets.md").read_text("utf-8"))
 

@@ -416,11 +416,12 @@ def _candidates(folder: Path, source: str, where: str) -> list[Path]:
 def _wanted(path: Path) -> Set[str]:
     """Endings of the files that a folder or a pattern means."""
     ending = path.suffix.lower()
-    return {ending} if needs_blender(ending[1:]) else _read_here()
+    reader = reader_of(ending[1:])
+    return {ending} if reader is not None and (reader.by_blender or reader.joins_files) else _read_here()
 
 
 def _read_here() -> Set[str]:
-    """Endings of the model files that are read without Blender: USD too where its package is installed."""
+    """Endings of the files of single models that are read without Blender: USD too where its package is installed."""
     return {f".{suffix}" for suffix in suffixes(by_blender=False)}
 
 

@@ -49,6 +49,9 @@ class ReaderSpec(Spec):
         "`moves`, and `clips`, each with `name`, `first` and `last`. A reader with `frames` needs it, except with `by_blender`",
     )
     by_blender: bool = Field(default=False, description="whether Blender reads the files: patterns must then end in the suffix")
+    joins_files: bool = Field(
+        default=False, description="whether a file joins the models of others: folders leave it out, patterns end in the suffix"
+    )
     is_picture: bool = Field(default=False, description="whether files are pictures, which folders and patterns leave out")
     packages: tuple[str, ...] = Field(default=(), description="optional packages that it imports")
     install: str = Field(default="", description="the name that pip installs for these packages, such as `viewsphere[usd]`")

@@ -70,7 +70,7 @@ class AssetSet(NamedTuple):
         category: The origin of the categories.
         axes: The axes of its files that are up and front, and their unit.
         licence: The licence or the terms of the set.
-        is_tried: Whether the source was tried on files of the set itself, not only on trees that tests make.
+        tried: The files of the set on which the source was tried, besides trees that tests make.
     """
 
     title: str
@@ -78,7 +78,7 @@ class AssetSet(NamedTuple):
     category: str
     axes: str
     licence: str
-    is_tried: bool = False
+    tried: str = "none"
 
 
 def _no_names() -> tuple[str, ...]:

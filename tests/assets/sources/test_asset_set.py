@@ -145,5 +145,5 @@ def test_inspect_counts_a_set_shows_some_of_it_and_names_broken_models(shelf, tm
     assert (tmp_path / "ycb-shelf-models.png").stat().st_size > 1000
     report = json.loads(CliRunner().invoke(app, ["inspect", "ycb:shelf", "--json"]).stdout)
     assert report["models"] == 4 and report["shown"] == [CAN, MUG] and sorted(report["faults"]) == ["011_banana", "013_apple"]
-    run = CliRunner().invoke(app, ["inspect", f"ycb:shelf/{MUG}"])
+    run = CliRunner().invoke(app, ["inspect", f"ycb:./cache/../shelf/{MUG}"])
     assert run.exit_code == 0 and re.search(r"axes +up \+z, forward -y; 1 unit = 1 m", run.stdout), run.output

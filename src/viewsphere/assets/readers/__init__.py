@@ -40,13 +40,16 @@ def missing(reader: ReaderSpec) -> list[str]:
 
 
 def suffixes(*, by_blender: bool | None = None) -> tuple[str, ...]:
-    """Sorted suffixes of model files, without pictures: all, or only those that Blender reads here, or only the others."""
+    """Sorted suffixes of model files, without pictures: all, or only those that Blender reads here, or only the others that do
+    not join models of other files.
+    """
     known = readers().values()
     ordered = sorted({suffix for one in known if not one.is_picture for suffix in one.suffixes})
     if by_blender is None:
         return tuple(ordered)
     chosen = ((suffix, _best(known, suffix)) for suffix in ordered)
-    return tuple(suffix for suffix, reader in chosen if reader is not None and reader.by_blender == by_blender)
+    here = ((suffix, reader) for suffix, reader in chosen if reader is not None and reader.by_blender == by_blender)
+    return tuple(suffix for suffix, reader in here if by_blender or not reader.joins_files)
 
 
 def third_party_sources(suffix: str) -> list[Path]:

@@ -49,6 +49,7 @@ SOURCE = asset_source(
         category="`metadata.pbtxt`, else the folder's name",
         axes="+Z up, front -Y, metres",
         licence="CC-BY-4.0",
+        tried="1 scan",
     ),
     models,
     file=lambda model: first_file(model, FILE),

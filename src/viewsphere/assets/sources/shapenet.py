@@ -80,6 +80,7 @@ SOURCE = asset_source(
         category="the synset's name",
         axes="+Y up, front -Z (version 1: +X), no unit: the diagonal is 1",
         licence="ShapeNet's terms: research only",
+        tried="1 model of version 2",
     ),
     models,
     file=lambda model: first_file(model, *FILES),

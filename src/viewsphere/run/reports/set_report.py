@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -51,7 +52,8 @@ def set_report(source: str) -> SetReport | None:
     if named is None or named.spec.folder is None:
         return None
     models = named.spec.expand(named.name)
-    if len(models) == 1 and Path(models[0].name) == Path(named.name).absolute():
+    asked = os.path.abspath(Path(named.name).expanduser())  # noqa: PTH100, sources keep links, too
+    if len(models) == 1 and Path(models[0].name) == Path(asked):
         return None
     usable = [model for model in models if not model.fault]
     return SetReport(

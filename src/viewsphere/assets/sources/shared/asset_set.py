@@ -28,6 +28,7 @@ def asset_source(
     file: Callable[[str], str | None],
     credit: Callable[[str], Credit],
     depth: int = 1,
+    depth_of: Callable[[str], int] | None = None,
     load: Callable[[ModelSpec, Path], Any] | None = None,
 ) -> SourceSpec:
     """The spec of a source that reads a set of models from a folder.
@@ -37,7 +38,8 @@ def asset_source(
         models: A function that lists models. A name may be the root of the set, or a folder or model below.
         file: `file(model)`: the file of the model at this path; None if it has none.
         credit: `credit(model)`: the credit of the model at this path.
-        depth: Number of names in a model's path below the root.
+        depth: Largest number of names in a model's path below the root.
+        depth_of: `depth_of(model)`: the number for the model at this path; by default `depth`.
         load: `load(model, file)`: the mesh or the file to read; by default the file.
     """
 
@@ -45,7 +47,7 @@ def asset_source(
         found = file(_path(model))
         if found is None:
             raise ModelError(f"{_path(model)}: no model of {about.title} ({about.layout})")
-        root = Path(_path(model)).parents[depth - 1]
+        root = Path(_path(model)).parents[(depth_of(_path(model)) if depth_of else depth) - 1]
         if model.confined and not _real(found).is_relative_to(_real(root)):
             raise ModelError(f"{found}: leads out of {root}. Copy the model, or set `confined: false`")
         return Path(found) if load is None else load(model, Path(found))
