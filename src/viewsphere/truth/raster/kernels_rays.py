@@ -5,22 +5,31 @@ without the projection, so it also holds for rays that point sideways or back. T
 triangles use a cube around the camera. Its faces are cut into cells, each with the pixels whose rays pass it, and a triangle
 projected on a face is bounded by its corners. All other triangles use a quadtree over the picture: each node stores the box of
 its rays. Products and sums are monotone in floating point too, so an edge function over the box bounds its values over the
-rays. Neither index loses a hit.
+rays. Neither index loses a hit. A triangle is skipped if all pixels of its box, or of a leaf, show nearer surfaces.
 """
 
 from __future__ import annotations
 
 import math
 
+import numba as nb
 import numpy as np
 
 from viewsphere.kernels.jit import inner, njit
-from viewsphere.truth.kernel_constants import NEARER
-from viewsphere.truth.raster.kernels_draw import NEVER, edges_inside, hits_surface, plane
+from viewsphere.truth.kernel_constants import FOUR, NEARER
+from viewsphere.truth.raster.kernels_draw import NEVER, edges_inside, hidden, hits_surface, plane
+from viewsphere.truth.raster.kernels_row import draw_four_along
 
+U = nb.uintp
 LEAF = 8  # pixels along a leaf's side
-MANY_CELLS, MANY_PIXELS = 64, 1024  # limits on the cells and pixels of a triangle's box, beyond which the tree is faster
-WIDER = 1e-9  # widening of a triangle's box on a face: more than the rounding of a projection
+MANY_CELLS = 256  # cells of a triangle's box, beyond which searching the whole picture is faster than reading them
+FEW_PIXELS = 128  # pixels of a triangle's box, up to which testing each is faster than searching the tree
+WIDER = 1e-9  # widening of a ray on a face: more than the rounding of a projection
+BITS = 12  # bits of a row or a column of cells in a vertex's place
+NOWHERE = -1  # place of a vertex that is on none of the faces
+CLOSEST = 1e-30  # metres along a face's axis from which on a vertex is on the face
+ABOVE = 1.0 + 4e-5  # bounds the rounding of 1/s, also of triangles seen almost edge-on, and how far coincident surfaces differ
+OPEN = np.int32(2**31 - 1)  # number above those of all nodes that are to be searched
 SLIVER = 1e-12  # limit of det, as a share of the product of the corners' distances, below which its sign is not trusted
 ORIGIN = (0.0, 0.0, 0.0)
 NO_BOX = (0, 0, -1, -1)
@@ -70,86 +79,143 @@ def build_tree(rays, levels):
 
 @inner
 def _on_face(face, x, y, z):
-    """The projection on a cube's face (0 to 5: +z, -z, +x, -x, +y, -y) and the distance along its axis; not positive if
-    behind.
+    """A point in the axes of a cube's face (0 to 5: +z, -z, +x, -x, +y, -y): across, up, and the distance along its axis; the
+    distance is not positive if the point is behind.
     """
     sign = 1.0 - 2.0 * (face % 2)
     if face < 2:
-        return x / (sign * z), y / (sign * z), sign * z
+        return x, y, sign * z
     if face < 4:
-        return y / (sign * x), z / (sign * x), sign * x
-    return z / (sign * y), x / (sign * y), sign * y
+        return y, z, sign * x
+    return z, x, sign * y
 
 
 @njit(_nrt=True)
-def build_faces(rays, count, size):
-    """First and last pixel whose ray passes each cell of the first `count` faces: (count, size, size, 4) x, y, x, y."""
+def build_faces(rays, count, size, side):
+    """First and last pixel with a ray through each cell of the first `count` faces: (count, size, size, 4) x, y, x, y.
+
+    `side` x `side` rays belong to a pixel. A single face also holds the rays beside it, in the cells of its border.
+    """
     height, width = rays.shape[:2]
     cells = np.empty((count, size, size, 4), np.int32)
     cells[..., 0], cells[..., 1], cells[..., 2:] = width, height, -1
+    reach = 1.0 + WIDER if count > 1 else np.inf
     for y in range(height):
         for x in range(width):
             for face in range(count):
-                u, v, along = _on_face(face, rays[y, x, 0], rays[y, x, 1], rays[y, x, 2])
-                if along > 0.0 and abs(u) <= 1.0 and abs(v) <= 1.0:
-                    cell = cells[face, _cell(v, size), _cell(u, size)]
-                    cell[0], cell[1] = min(cell[0], x), min(cell[1], y)
-                    cell[2], cell[3] = max(cell[2], x), max(cell[3], y)
+                across, up, along = _on_face(face, rays[y, x, 0], rays[y, x, 1], rays[y, x, 2])
+                if not along > 0.0:
+                    continue
+                u, v = across / along, up / along
+                if not (abs(u) <= reach and abs(v) <= reach):
+                    continue
+                px, py = x // side, y // side
+                for j in range(_cell(v - WIDER, size), _cell(v + WIDER, size) + 1):
+                    for i in range(_cell(u - WIDER, size), _cell(u + WIDER, size) + 1):
+                        cell = cells[face, j, i]
+                        cell[0], cell[1] = min(cell[0], px), min(cell[1], py)
+                        cell[2], cell[3] = max(cell[2], px), max(cell[3], py)
     return cells
 
 
 @inner
 def _cell(u, size):
-    return min(np.int64((u + 1.0) * 0.5 * size), size - 1)
+    """The row or column of cells that holds a coordinate on a face; the outermost one for coordinates beyond."""
+    return min(np.int64((min(max(u, -1.0), 1.0) + 1.0) * 0.5 * size), size - 1)
 
 
 @njit
-def pixel_box(cells, q0, q1, q2):
-    """Return whether the triangle is small and on one face, and if so the box of pixels that may see it."""
+def place(q, cells, places, inverses):
+    """Fill places (V,) int32, the cell of each vertex as (face, row, column) in one number, NOWHERE if it is on no face, and
+    inverses (V,) float32, one over its distance along the face's axis.
+
+    With six faces, each vertex is on that whose axis it is nearest to.
+    """
     count, size = cells.shape[:2]
-    ax, ay, az = abs(q0[0]), abs(q0[1]), abs(q0[2])
-    axis = 0 if az >= ax and az >= ay else 1 if ax >= ay else 2
-    face = 2 * axis + (1 if (q0[2], q0[0], q0[1])[axis] < 0.0 else 0)
-    if face >= count:
-        return False, NO_BOX
-    u0, v0, a0 = _on_face(face, q0[0], q0[1], q0[2])
-    u1, v1, a1 = _on_face(face, q1[0], q1[1], q1[2])
-    u2, v2, a2 = _on_face(face, q2[0], q2[1], q2[2])
-    if not (a0 > 0.0 and a1 > 0.0 and a2 > 0.0):
-        return False, NO_BOX
-    ua, va = min(u0, u1, u2) - WIDER, min(v0, v1, v2) - WIDER
-    ub, vb = max(u0, u1, u2) + WIDER, max(v0, v1, v2) + WIDER
-    if not (ua >= -1.0 and va >= -1.0 and ub <= 1.0 and vb <= 1.0):
-        return False, NO_BOX
-    ia, ja, ib, jb = _cell(ua, size), _cell(va, size), _cell(ub, size), _cell(vb, size)
+    for i in range(U(q.shape[0])):
+        x, y, z = q[i, U(0)], q[i, U(1)], q[i, U(2)]
+        ax, ay, az = abs(x), abs(y), abs(z)
+        face = 0
+        if count > 1:
+            axis, positive = (0, z > 0.0) if az >= ax and az >= ay else (1, x > 0.0) if ax >= ay else (2, y > 0.0)
+            face = 2 * axis + (0 if positive else 1)
+        across, up, along = _on_face(face, x, y, z)
+        places[i] = NOWHERE
+        if along > CLOSEST and abs(across) < np.inf and abs(up) < np.inf:
+            inverse = 1.0 / along
+            places[i] = (face << BITS | _cell(up * inverse, size)) << BITS | _cell(across * inverse, size)
+            inverses[i] = inverse
+
+
+@inner
+def pixel_box(cells, p0, p1, p2):
+    """Whether a triangle with these places is on one face and not very large, and if so the box of pixels that may see it; and
+    the least length of a ray on its cells whose distance along the face's axis is 1.
+    """
+    count, size = cells.shape[:2]
+    face = p0 >> 2 * BITS
+    if (p0 | p1 | p2) < 0 or (p1 >> 2 * BITS) != face or (p2 >> 2 * BITS) != face:
+        return False, NO_BOX, 1.0
+    mask = (1 << BITS) - 1
+    i0, i1, i2 = p0 & mask, p1 & mask, p2 & mask
+    j0, j1, j2 = p0 >> BITS & mask, p1 >> BITS & mask, p2 >> BITS & mask
+    ia, ja, ib, jb = min(i0, i1, i2), min(j0, j1, j2), max(i0, i1, i2), max(j0, j1, j2)
     if (ib - ia + 1) * (jb - ja + 1) > MANY_CELLS:
-        return False, NO_BOX
+        return False, NO_BOX, 1.0
     xa, ya, xb, yb = np.int32(2**30), np.int32(2**30), np.int32(-1), np.int32(-1)
-    for j in range(ja, jb + 1):
-        for i in range(ia, ib + 1):
-            cell = cells[face, j, i]
-            xa, ya, xb, yb = min(xa, cell[0]), min(ya, cell[1]), max(xb, cell[2]), max(yb, cell[3])
-    return (xb - xa + 1) * (yb - ya + 1) <= MANY_PIXELS or xb < 0, (xa, ya, xb, yb)
+    for j in range(U(ja), U(jb + 1)):
+        for i in range(U(ia), U(ib + 1)):
+            xa, ya = min(xa, cells[U(face), j, i, U(0)]), min(ya, cells[U(face), j, i, U(1)])
+            xb, yb = max(xb, cells[U(face), j, i, U(2)]), max(yb, cells[U(face), j, i, U(3)])
+    length = 1.0
+    if count > 1:
+        u, v = _least(ia, ib, size), _least(ja, jb, size)
+        length = math.sqrt(1.0 + u * u + v * v)
+    return True, (np.int64(xa), np.int64(ya), np.int64(xb), np.int64(yb)), length
 
 
 @inner
-def _highest(e, box):
-    return max(e[0] * box[0], e[0] * box[3]) + (max(e[1] * box[1], e[1] * box[4]) + max(e[2] * box[2], e[2] * box[5]))
+def _least(first, last, size):
+    """The least absolute coordinate of these columns of cells."""
+    return max(first * (2.0 / size) - 1.0, 1.0 - (last + 1) * (2.0 / size), 0.0)
 
 
 @inner
-def _lowest(e, box):
-    return min(e[0] * box[0], e[0] * box[3]) + (min(e[1] * box[1], e[1] * box[4]) + min(e[2] * box[2], e[2] * box[5]))
+def _top(e):
+    """The numbers of a box at which an edge function is highest."""
+    return U(3 if e[0] >= 0.0 else 0), U(4 if e[1] >= 0.0 else 1), U(5 if e[2] >= 0.0 else 2)
 
 
 @inner
-def _may_hit(e0, e1, e2, sliver, box):
-    """Return whether a ray in the box may pass the test of all three edges; for a sliver, also with the opposite sign."""
-    if box[0] > box[3]:
+def _at(e, boxes, node, corner):
+    """An edge function at a corner of a node's box."""
+    return e[0] * boxes[node, corner[0]] + (e[1] * boxes[node, corner[1]] + e[2] * boxes[node, corner[2]])
+
+
+@inner
+def _may_hit(edges, tops, sliver, boxes, node):
+    """Return whether a ray in the node's box may pass the test of all three edges; for a sliver, of either sign."""
+    if boxes[node, U(0)] > boxes[node, U(3)]:
         return False
-    if _highest(e0, box) >= 0.0 and _highest(e1, box) >= 0.0 and _highest(e2, box) >= 0.0:
+    (a, b, c), (p, q, r) = edges, tops
+    if _at(a, boxes, node, p) >= 0.0 and _at(b, boxes, node, q) >= 0.0 and _at(c, boxes, node, r) >= 0.0:
         return True
-    return sliver and _lowest(e0, box) <= 0.0 and _lowest(e1, box) <= 0.0 and _lowest(e2, box) <= 0.0
+    if not sliver:
+        return False
+    p, q, r = _opposite(p), _opposite(q), _opposite(r)
+    return _at(a, boxes, node, p) <= 0.0 and _at(b, boxes, node, q) <= 0.0 and _at(c, boxes, node, r) <= 0.0
+
+
+@inner
+def _level(inverse):
+    """A 1/s as a 32-bit integer with the same order if it is positive; negative numbers have negative integers."""
+    return np.float32(inverse).view(np.int32)
+
+
+@inner
+def _opposite(corner):
+    """The opposite corner of a box."""
+    return U(3) - corner[0], U(5) - corner[1], U(7) - corner[2]
 
 
 @inner
@@ -183,35 +249,63 @@ def draw(q, triangles, span, table, origin, unit, cutout, alpha_masks, nearest, 
     """Draw triangles into nearest (1/s, 0 if none) and seen (triangle, -1 if none).
 
     `span` is the first triangle, the one after the last, and the number of the vertex in q[0]; q is in camera axes. `table` is
-    (rays, levels, boxes, cells), and `origin` is the canvas' first pixel (x, y) in it. If `unit` is set, the rays have length 1
-    rather than z = 1.
+    (rays, levels, boxes, cells, places, inverses), the last two as `place` gives them, and `origin` is the canvas' first pixel
+    (x, y) in it. If `unit` is set, the rays have length 1 rather than z = 1.
     """
-    rays, levels, boxes, cells = table
+    rays, levels, boxes, cells, places, inverses = table
     first, last, base = span
     leaves = leaf_list(levels)
     window = (origin[0], origin[1], origin[0] + nearest.shape[1], origin[1] + nearest.shape[0])
+    least = np.zeros(levels[-1, 0] + 1, np.int32)
+    whole = (0, 0, nearest.shape[1] - 1, nearest.shape[0] - 1)
+    a, b, c = U(0), U(1), U(2)
     for t in range(first, last):
-        i0, i1, i2 = triangles[t, 0] - base, triangles[t, 1] - base, triangles[t, 2] - base
-        q0, q1, q2 = (q[i0, 0], q[i0, 1], q[i0, 2]), (q[i1, 0], q[i1, 1], q[i1, 2]), (q[i2, 0], q[i2, 1], q[i2, 2])
-        endless = cutout[t] < NEVER
-        if cutout[t] == NEVER or (not unit and not endless and q0[2] <= 0.0 and q1[2] <= 0.0 and q2[2] <= 0.0):
+        ut = U(t)
+        i0, i1, i2 = U(triangles[ut, a] - base), U(triangles[ut, b] - base), U(triangles[ut, c] - base)
+        endless = cutout[ut] < NEVER
+        bounded, box, length = (False, NO_BOX, 1.0) if endless else pixel_box(cells, places[i0], places[i1], places[i2])
+        most = max(inverses[i0], inverses[i1], inverses[i2]) * ABOVE / length if bounded else np.inf
+        box = _within(box, window) if bounded else whole
+        if cutout[ut] == NEVER or box[0] > box[2] or box[1] > box[3] or _is_hidden(nearest, box, most):
             continue
-        small, box = (False, NO_BOX) if endless else pixel_box(cells, q0, q1, q2)
-        if small and box[2] < 0:
+        q0, q1, q2 = (q[i0, a], q[i0, b], q[i0, c]), (q[i1, a], q[i1, b], q[i1, c]), (q[i2, a], q[i2, b], q[i2, c])
+        if not unit and not endless and q0[2] <= 0.0 and q1[2] <= 0.0 and q2[2] <= 0.0:
             continue
         nx, ny, nz, det = plane(q0, q1, q2)
         if det == 0.0:
             continue
-        e0, e1, e2 = edges_inside(q0, q1, q2, (nx, ny, nz), det, cutout[t])
+        edges = edges_inside(q0, q1, q2, (nx, ny, nz), det, cutout[ut])
         sliver, bounds = (False, ANY_DEPTH) if endless else limits(q0, q1, q2, det, unit)
-        n = (nx / det, ny / det, nz / det)
-        if small:
-            _draw_box(t, e0, e1, e2, n, sliver, bounds, rays, box, origin, cutout[t], alpha_masks, nearest, seen)
-            continue
-        for i in range(touched(e0, e1, e2, sliver, levels, boxes, window, leaves)):
-            x, y = leaves[i, 0], leaves[i, 1]
-            box = (x, y, x + LEAF - 1, y + LEAF - 1)
-            _draw_box(t, e0, e1, e2, n, sliver, bounds, rays, box, origin, cutout[t], alpha_masks, nearest, seen)
+        surface = t, cutout[ut], sliver, edges, (nx / det, ny / det, nz / det), bounds
+        few = (box[2] - box[0] + 1) * (box[3] - box[1] + 1) <= FEW_PIXELS
+        pixels = box[0] + origin[0], box[1] + origin[1], box[2] + origin[0] + 1, box[3] + origin[1] + 1
+        # One call of `_draw_box`, so that LLVM inlines it.
+        for i in range(1 if few else touched(edges, surface[4], sliver, levels, boxes, pixels, least, OPEN, leaves)):
+            part = box
+            if not few:
+                x, y = np.int64(leaves[i, 0]), np.int64(leaves[i, 1])
+                leaf = _within((x, y, x + LEAF - 1, y + LEAF - 1), pixels)
+                part = leaf[0] + box[0], leaf[1] + box[1], leaf[2] + box[0], leaf[3] + box[1]
+                node = U(y // LEAF * levels[U(0), U(2)] + x // LEAF)
+                bound = most if sliver else min(most, _at(surface[4], boxes, node, _top(surface[4])) * ABOVE)
+                if _is_hidden(nearest, part, bound):
+                    continue
+            _draw_box(surface, rays, part, origin, alpha_masks, nearest, seen)
+
+
+@inner
+def _within(box, window):
+    """A box of pixels (both ends included) as far as the window reaches, measured from the window's first pixel."""
+    x0, y0, x1, y1 = window
+    return max(box[0], x0) - x0, max(box[1], y0) - y0, min(box[2] + 1, x1) - 1 - x0, min(box[3] + 1, y1) - 1 - y0
+
+
+@inner
+def _is_hidden(nearest, box, most):
+    """Return whether all pixels of a box show a surface nearer than 1/s = most; False for wide boxes, which are not tested."""
+    if box[2] - box[0] >= 2 * FOUR or nearest.shape[1] < FOUR:
+        return False
+    return hidden(nearest, box[0], box[1], box[2], box[3], most)
 
 
 @njit(_nrt=True)
@@ -220,43 +314,75 @@ def leaf_list(levels):
     return np.empty((levels[0, 1] * levels[0, 2] + 256, 3), np.int32)
 
 
-@njit
-def touched(e0, e1, e2, sliver, levels, boxes, window, leaves):
+@inner
+def touched(edges, n, sliver, levels, boxes, window, least, most, leaves):
     """Number of leaves in the window (x0, y0, x1, y1) that the triangle may touch; their first pixels (x, y) in `leaves`.
 
-    The end of the list is used as the stack: a tree of L levels never has more than 3 L + 1 pending nodes.
+    A node is left out if its number in `least` is not less than `most`, or than the triangle's greatest 1/s there, n . d.
+    Both are a float32 1/s as an integer of the same order.
+
+    The search begins at the four nodes that together hold the window, or at the root. The end of the list is used as the
+    stack: with L levels, never more than 3 L + 4 nodes are pending.
     """
-    found, top = 0, leaves.shape[0]
-    leaves[top - 1] = (len(levels) - 1, 0, 0)
-    waiting = 1
+    tops, highest = (_top(edges[0]), _top(edges[1]), _top(edges[2])), _top(n)
+    size, start = max(window[2] - window[0], window[3] - window[1]), 0
+    while start < len(levels) - 1 and LEAF << start < size:
+        start += 1
+    found, top, waiting = 0, leaves.shape[0], 0
+    side = LEAF << start
+    for row in range(window[1] // side, (window[3] - 1) // side + 1):
+        for column in range(window[0] // side, (window[2] - 1) // side + 1):
+            waiting += 1
+            at = U(top - waiting)
+            leaves[at, U(0)], leaves[at, U(1)], leaves[at, U(2)] = start, row, column
     while waiting > 0:
-        level, row, column = leaves[top - waiting]
+        at = U(top - waiting)
+        level, row, column = np.int64(leaves[at, U(0)]), np.int64(leaves[at, U(1)]), np.int64(leaves[at, U(2)])
         waiting -= 1
         side = LEAF << level
         x, y = column * side, row * side
         if y >= window[3] or y + side <= window[1] or x >= window[2] or x + side <= window[0]:
             continue
-        if not _may_hit(e0, e1, e2, sliver, boxes[levels[level, 0] + row * levels[level, 2] + column]):
+        node = U(levels[U(level), U(0)] + row * levels[U(level), U(2)] + column)
+        if least[node] >= most or not _may_hit(edges, tops, sliver, boxes, node):
+            continue
+        if not sliver and least[node] > 0 and least[node] >= _level(_at(n, boxes, node, highest) * ABOVE):
             continue
         if level == 0:
-            leaves[found, 0], leaves[found, 1] = x, y
+            leaves[U(found), U(0)], leaves[U(found), U(1)] = x, y
             found += 1
             continue
         below = level - 1
-        for j in range(2 * row, min(2 * row + 2, levels[below, 1])):
-            for i in range(2 * column, min(2 * column + 2, levels[below, 2])):
+        for j in range(2 * row, min(2 * row + 2, levels[U(below), U(1)])):
+            for i in range(2 * column, min(2 * column + 2, levels[U(below), U(2)])):
                 waiting += 1
-                leaves[top - waiting, 0], leaves[top - waiting, 1], leaves[top - waiting, 2] = below, j, i
+                at = U(top - waiting)
+                leaves[at, U(0)], leaves[at, U(1)], leaves[at, U(2)] = below, j, i
     return found
 
 
 @inner
-def _draw_box(t, a, b, c, n, sliver, bounds, rays, box, origin, cutout, alpha_masks, nearest, seen):
-    """Test each ray of a box of pixels (both ends included), as far as the canvas reaches."""
-    height, width = nearest.shape
-    x0, y0 = origin
-    for y in range(max(box[1], y0), min(box[3] + 1, y0 + height)):
-        for x in range(max(box[0], x0), min(box[2] + 1, x0 + width)):
+def _draw_box(surface, rays, box, origin, alpha_masks, nearest, seen):
+    """Test each ray of a box of the canvas' pixels (both ends included)."""
+    t, cutout, sliver, (e0, e1, e2), n, _ = surface
+    if cutout >= 0 or sliver or nearest.shape[1] < FOUR:
+        _draw_checked(surface, rays, box, origin, alpha_masks, nearest, seen)
+        return
+    width, across = nearest.shape[1], rays.shape[1]
+    for y in range(box[1], box[3] + 1):
+        row, ray = y * width, (y + origin[1]) * across + origin[0]
+        for x in range(box[0], box[2] + 1, FOUR):
+            first = min(x, width - FOUR)  # pixels beside the box are tested as well
+            draw_four_along(nearest, seen, U(row + first), rays, U(3 * (ray + first)), t, e0, e1, e2, n)
+
+
+@inner
+def _draw_checked(surface, rays, box, origin, alpha_masks, nearest, seen):
+    """Draw a cut-out, or a sliver with uncertain facing, whose 1/s stays within the bounds: either sign passes the test."""
+    t, cutout, sliver, (a, b, c), n, bounds = surface
+    for j in range(box[1], box[3] + 1):
+        for i in range(box[0], box[2] + 1):
+            y, x = j + origin[1], i + origin[0]
             dx, dy, dz = rays[y, x, 0], rays[y, x, 1], rays[y, x, 2]
             e0 = a[0] * dx + (a[1] * dy + a[2] * dz)
             e1 = b[0] * dx + (b[1] * dy + b[2] * dz)
@@ -264,7 +390,6 @@ def _draw_box(t, a, b, c, n, sliver, bounds, rays, box, origin, cutout, alpha_ma
             inside = e0 >= 0.0 and e1 >= 0.0 and e2 >= 0.0
             if inside or (sliver and e0 <= 0.0 and e1 <= 0.0 and e2 <= 0.0):
                 inverse = min(max(n[0] * dx + (n[1] * dy + n[2] * dz), bounds[0]), bounds[1])
-                i, j = x - x0, y - y0
                 if inverse > nearest[j, i] * NEARER and hits_surface(alpha_masks, cutout, e0, e1, e2):
                     nearest[j, i] = inverse
                     seen[j, i] = t

@@ -146,3 +146,51 @@ def meet_four(
         return context.get_dummy_value()
 
     return nb.void(x, y, nearest, met, own, nb.intp, nb.intp, _EDGES, _EDGES, _EDGES, _EDGES), code
+
+
+@intrinsic
+def draw_four_along(
+    typing: Any, nearest: Any, seen: Any, at: Any, rays: Any, ray: Any, t: Any, e0: Any, e1: Any, e2: Any, n: Any
+) -> Any:
+    """Write triangle t to each of four pixels whose ray is inside it and meets it nearer; the pixels begin at flat index `at`,
+    the coordinates of their rays at flat index `ray`.
+
+    A ray d is inside if e . d is not negative for all three edges; its 1/s, n . d, must exceed the 1/s shown so far times
+    NEARER.
+    """
+
+    def code(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        nearest, seen, at, rays, ray, t, e0, e1, e2, n = arguments
+        place = _from(context, builder, signature.args[0], nearest, at, _REALS)
+        x, y, z = _coordinates(context, builder, signature.args[3], rays, ray)
+
+        def along(e: Any) -> Any:
+            a, b, c = (_spread(builder, builder.extract_value(e, i)) for i in range(3))
+            return builder.fadd(builder.fmul(a, x), builder.fadd(builder.fmul(b, y), builder.fmul(c, z)))
+
+        shown, inverse = builder.load(place, align=8), along(n)
+        flags = builder.fcmp_ordered(">", inverse, builder.fmul(shown, ir.Constant(_REALS, [NEARER] * FOUR)))
+        for e in (e0, e1, e2):
+            flags = builder.and_(flags, builder.fcmp_ordered(">=", along(e), ir.Constant(_REALS, [0.0] * FOUR)))
+        with builder.if_then(builder.icmp_unsigned("!=", builder.bitcast(flags, _FLAGS), _FLAGS(0))):
+            owner = _from(context, builder, signature.args[1], seen, at, _WHOLES)
+            number = _spread(builder, builder.trunc(t, _WHOLE))
+            builder.store(builder.select(flags, inverse, shown), place, align=8)
+            builder.store(builder.select(flags, number, builder.load(owner, align=4)), owner, align=4)
+        return context.get_dummy_value()
+
+    return nb.void(nearest, seen, at, rays, ray, nb.intp, _EDGES, _EDGES, _EDGES, _EDGES), code
+
+
+def _coordinates(context: Any, builder: Any, kind: Any, rays: Any, at: Any) -> tuple[Any, Any, Any]:
+    """The x, y and z of four rays, whose twelve numbers begin at this flat index."""
+    parts = [
+        builder.load(_from(context, builder, kind, rays, builder.add(at, at.type(FOUR * i)), _REALS), align=8) for i in range(3)
+    ]
+    first = builder.shuffle_vector(parts[0], parts[1], ir.Constant(ir.VectorType(_WHOLE, 8), list(range(8))))
+    last = builder.shuffle_vector(parts[2], parts[2], ir.Constant(ir.VectorType(_WHOLE, 8), list(range(8))))
+
+    def every_third(begin: int) -> Any:
+        return builder.shuffle_vector(first, last, ir.Constant(_WHOLES, list(range(begin, 12, 3))))
+
+    return every_third(0), every_third(1), every_third(2)

@@ -309,6 +309,16 @@ class RayTable:
         """(rays, levels, boxes, cells), in the form that the kernels take."""
         return self.rays, self.levels, self.boxes, self.cells
 
+    def placed(self, q: NDArray[np.float64]) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
+        """The cells of vertices q (V, 3 or more) in camera axes, and their inverse distances, as `kernels_rays.place` gives
+        them.
+        """
+        from viewsphere.truth.raster import kernels_rays as kernels
+
+        places, inverses = np.empty(len(q), np.int32), np.empty(len(q), np.float32)
+        kernels.place(q, self.cells, places, inverses)
+        return places, inverses
+
 
 def _canvas(camera: Camera, window: Window) -> Window:
     """The rectangle of pixels to tabulate for this window, chosen from a few, so that a table serves many
@@ -332,15 +342,17 @@ def _ray_table(lens: str, samples: int, canvas: Window) -> RayTable:
     return index_rays(intrinsics, pixel_rays(intrinsics, samples, canvas), samples)
 
 
-def index_rays(intrinsics: Intrinsics, rays: NDArray[np.float64], samples: int) -> RayTable:
-    """The ray table of a distorted lens with its spatial indices: rays (H, W, 3), `samples` x `samples` of them per pixel."""
+def index_rays(intrinsics: Intrinsics, rays: NDArray[np.float64], samples: int, side: int = 1) -> RayTable:
+    """The ray table of a distorted lens with its spatial indices: rays (H, W, 3), `samples` x `samples` of them per pixel, and
+    `side` x `side` per pixel of the cells.
+    """
     from viewsphere.truth.raster import kernels_rays as kernels
 
     rays.setflags(write=False)
     levels = kernels.tree_levels(rays.shape[0], rays.shape[1])
     lens = intrinsics.lens
     size = lens.ray_cells or min(max(int(intrinsics.fx * samples), 16), 512)  # cells of about two pixels
-    cells = kernels.build_faces(rays, 6 if lens.has_unit_rays else 1, size)
+    cells = kernels.build_faces(rays, 6 if lens.has_unit_rays else 1, size, side)
     return RayTable(rays, levels, kernels.build_tree(rays, levels), cells)
 
 
@@ -374,7 +386,7 @@ def _draw(
         canvas = _canvas(camera, window)
         t = _ray_table(camera.intrinsics.model_dump_json(), samples, canvas)
         origin = (x0 - samples * canvas[0], y0 - samples * canvas[1])
-        table, unit = t.arrays, camera.lens.has_unit_rays
+        table, unit = (*t.arrays, *t.placed(q)), camera.lens.has_unit_rays
         kernels_rays.draw(q, geometry.triangles, span, table, origin, unit, *cut, nearest, seen)
         return nearest, seen
     canvas, parts = (x0, y0, x1 - x0, y1 - y0), [(base, stop, first, last)]

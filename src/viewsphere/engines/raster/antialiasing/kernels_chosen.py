@@ -192,6 +192,18 @@ def numbered(marks):
 
 
 @njit
+def shown_around(triangle, pixels, shown):
+    """Set shown (T,) for the triangles (`triangle`, (H, W)) at the chosen pixels and at the pixels around each."""
+    height, width = triangle.shape
+    for k in range(U(pixels.shape[0] - 1)):
+        y, x = pixels[k] // width, pixels[k] % width
+        for j in range(U(max(y - 1, 0)), U(min(y + 2, height))):
+            for i in range(U(max(x - 1, 0)), U(min(x + 2, width))):
+                if triangle[j, i] >= 0:
+                    shown[U(triangle[j, i])] = 1
+
+
+@njit
 def level(inverse):
     """A positive 1/z as a 32-bit integer with the same order."""
     return np.float32(inverse).view(np.int32)

@@ -13,6 +13,8 @@ from llvmlite import ir
 from numba.core import cgutils
 from numba.extending import intrinsic
 
+from viewsphere.truth.raster.kernels_rays import ABOVE
+
 FOUR = 4
 _WHOLE = ir.IntType(32)
 
@@ -90,6 +92,60 @@ def inside(typing: Any, edges: Any, plane: Any, bounds: Any, x: Any, y: Any, off
 
 
 @intrinsic
+def covered(typing: Any, edges: Any, slope: Any, bounds: Any, x: Any, y: Any, offsets: Any, nearest: Any, row: Any) -> Any:
+    """Return the samples of the pixel at (x, y) at which no edge function is negative, and at which the triangle is hardly
+    behind 1/z = nearest[row] (n, 4): one bit for each sample.
+
+    slope and bounds are those of `kernels_parallel.depth_at`; the other arguments are those of `cover`.
+    """
+    kind = nb.uint8(edges, slope, bounds, x, y, offsets, nearest, row)
+
+    def code(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        edges, slope, bounds, x, y, offsets, nearest, row = arguments
+        places = _data(context, builder, kind.args[5], offsets)
+        px, py = _beside(builder, x, places, 0), _beside(builder, y, places, FOUR)
+
+        def value(a: Any, b: Any, c: Any) -> Any:
+            return builder.fadd(builder.fmul(a, px), builder.fadd(builder.fmul(b, py), c))
+
+        a, b, z0, u0, v0 = (_all(builder, part) for part in cgutils.unpack_tuple(builder, slope, 5))
+        z = builder.fadd(builder.fmul(b, builder.fsub(py, v0)), z0)
+        z = builder.fadd(builder.fmul(a, builder.fsub(px, u0)), z)
+        low, high = (_all(builder, part) for part in cgutils.unpack_tuple(builder, bounds, 2))
+        z = builder.select(builder.fcmp_ordered("<", z, low), low, z)
+        z = builder.select(builder.fcmp_ordered(">", z, high), high, z)
+        before = _load(builder, _data(context, builder, kind.args[6], nearest), builder.mul(row, row.type(FOUR)))
+        times = builder.fmul(z, before)
+        is_near = builder.fcmp_ordered("<=", times, ir.Constant(times.type, [ABOVE] * FOUR))
+        return _not_negative(builder, edges, value, [is_near])
+
+    return kind, code
+
+
+@intrinsic
+def along(typing: Any, edges: Any, plane: Any, rays: Any, nearest: Any, row: Any) -> Any:
+    """Return the rays d of rays[row] (n, 3, 4) at which no edge function e . d is negative, and at which plane . d is not less
+    than nearest[row] (n, 4): one bit for each ray.
+    """
+    kind = nb.uint8(edges, plane, rays, nearest, row)
+
+    def code(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        edges, plane, rays, nearest, row = arguments
+        data, four = _data(context, builder, kind.args[2], rays), row.type(FOUR)
+        first = builder.mul(row, row.type(3 * FOUR))
+        dx, dy, dz = (_load(builder, data, builder.add(first, first.type(FOUR * i))) for i in range(3))
+
+        def product(a: Any, b: Any, c: Any) -> Any:
+            return builder.fadd(builder.fmul(a, dx), builder.fadd(builder.fmul(b, dy), builder.fmul(c, dz)))
+
+        before = _load(builder, _data(context, builder, kind.args[3], nearest), builder.mul(row, four))
+        inverse = product(*(_all(builder, part) for part in cgutils.unpack_tuple(builder, plane, 3)))
+        return _not_negative(builder, edges, product, [builder.fcmp_ordered(">=", inverse, before)])
+
+    return kind, code
+
+
+@intrinsic
 def nearer(typing: Any, inverse: Any, at: Any, nearest: Any, row: Any) -> Any:
     """Return the samples at which inverse[at] is greater than nearest[row], both (n, 4), as one bit for each sample."""
 
@@ -143,6 +199,16 @@ def _sample(builder: Any, values: Any, bounds: Any) -> tuple[Any, Any]:
     z = builder.select(builder.fcmp_ordered("<", z, bounds[1]), z, bounds[1])
     flags = [builder.fcmp_ordered(">=", value, ir.Constant(value.type, [0.0] * FOUR)) for value in edges]
     return reduce(builder.and_, flags), builder.fptrunc(z, ir.VectorType(ir.FloatType(), FOUR))
+
+
+def _not_negative(builder: Any, edges: Any, value: Any, flags: list[Any]) -> Any:
+    """Bits of the lanes with all these flags in which `value`, of an edge's three coefficients, is not negative for any of the
+    edges.
+    """
+    for edge in cgutils.unpack_tuple(builder, edges, 3):
+        v = value(*(_all(builder, part) for part in cgutils.unpack_tuple(builder, edge, 3)))
+        flags.append(builder.fcmp_ordered(">=", v, ir.Constant(v.type, [0.0] * FOUR)))
+    return builder.zext(builder.bitcast(reduce(builder.and_, flags), ir.IntType(FOUR)), ir.IntType(8))
 
 
 def _data(context: Any, builder: Any, kind: Any, array: Any) -> Any:

@@ -15,6 +15,7 @@ import numba as nb
 import numpy as np
 
 from viewsphere.engines.raster.antialiasing.kernels_chosen import CLOSED, TILE, level
+from viewsphere.engines.raster.antialiasing.kernels_four import FOUR, along, covered
 from viewsphere.kernels.jit import inner, njit
 from viewsphere.truth.kernel_constants import NEARER
 from viewsphere.truth.raster.kernels_draw import (
@@ -29,7 +30,7 @@ from viewsphere.truth.raster.kernels_draw import (
     plane,
 )
 from viewsphere.truth.raster.kernels_parallel import covers, depth_at, surface_of
-from viewsphere.truth.raster.kernels_rays import ANY_DEPTH, LEAF, NO_BOX, leaf_list, limits, pixel_box, touched
+from viewsphere.truth.raster.kernels_rays import ABOVE, ANY_DEPTH, LEAF, NO_BOX, leaf_list, limits, pixel_box, touched
 
 U = nb.uintp
 TIE = 1e-5  # relative difference of 1/z below which two surfaces count as coincident
@@ -166,7 +167,7 @@ def _draw_wide(surface, edges, checked, box, most, found, points, alpha_masks, t
     scales = (crossing_at(edges[0][0], 1), crossing_at(edges[1][0], 1), crossing_at(edges[2][0], 1))
     for y in range(ya, ya + 1 if medium else yb + 1):
         if medium:
-            count = _open_tiles(farthest, blocks, box, edges, most, found)
+            count = _open_tiles(farthest, blocks, box, edges, False, most, found)
         else:
             span = (xa, xb) if checked else _span(edges, scales, y, xa, xb, points[3])
             count = _open_row(farthest, points, y, span, yb - ya < NARROW, most, found)
@@ -200,8 +201,10 @@ def _open(farthest, xa, ya, xb, yb, most, found):
 
 
 @inner
-def _open_tiles(farthest, blocks, box, edges, most, found):
-    """The pixels of `_open`, limited to the tiles of the box that the triangle may touch."""
+def _open_tiles(farthest, blocks, box, edges, checked, most, found):
+    """The pixels of `_open`, limited to the tiles of the box that the triangle may touch, by the signs of its edges unless it
+    is `checked`.
+    """
     xa, ya, xb, yb = box
     count = U(0)
     for row in range(ya // TILE, yb // TILE + 1):
@@ -209,7 +212,8 @@ def _open_tiles(farthest, blocks, box, edges, most, found):
             if blocks[U(row), U(column)] >= most:
                 continue
             x, y = float(column * TILE), float(row * TILE)
-            if _is_outside(edges[0], x, y) or _is_outside(edges[1], x, y) or _is_outside(edges[2], x, y):
+            outside = _is_outside(edges[0], x, y) or _is_outside(edges[1], x, y) or _is_outside(edges[2], x, y)
+            if outside and not checked:
                 continue
             for v in range(U(max(ya, row * TILE)), U(min(yb, row * TILE + TILE - 1) + 1)):
                 for u in range(U(max(xa, column * TILE)), U(min(xb, column * TILE + TILE - 1) + 1)):
@@ -378,124 +382,189 @@ def _share_edge(q, triangles, s, t):
     return same >= 2
 
 
+@njit
+def gather_rays(rays, pixels, side, found):
+    """Fill found (K, 3, M) with the rays of the K chosen pixels, `side` x `side` of `rays` (side H, side W, 3) for each."""
+    across = U(rays.shape[1]) // U(side)
+    for k in range(U(pixels.shape[0] - 1)):
+        y, x = U(pixels[k]) // across * U(side), U(pixels[k]) % across * U(side)
+        for i in range(U(side * side)):
+            for c in range(U(3)):
+                found[k, c, i] = rays[y + i // U(side), x + i % U(side), c]
+
+
 @njit(_nrt=True)
 def draw_rays(q, order, triangles, cutout, alpha_masks, see_through, unit, table, points, solid, fragments):
     """The equivalent of `draw` along rays: `table` is (rays, levels, boxes, cells) of `kernels_rays`, with S x S rays per
     pixel.
 
-    `points` is (grid, pixels, S); q is in camera axes. If `unit` is set, the rays have length 1 rather than z = 1.
+    `points` is (grid, rays, S, places, inverses): rays are those of `gather_rays`, the last two those of `kernels_rays.place`.
+    q is in camera axes. If `unit` is set, the rays have length 1 rather than z = 1.
     """
-    rays, levels, boxes, faces = table
-    leaves = leaf_list(levels)
-    window = (0, 0, rays.shape[1], rays.shape[0])
-    for t in order:
-        if cutout[t] == NEVER:
+    _, levels, boxes, cells = table
+    grid, _, side, places, inverses = points
+    farthest, tiles = solid[2], solid[3]
+    leaves, found, least = leaf_list(levels), np.empty(TILE * TILE + 1, np.uint32), _least_levels(farthest, levels, side)
+    whole = (0, 0, grid.shape[1] - 1, grid.shape[0] - 1)
+    a, b, c = U(0), U(1), U(2)
+    for o in range(U(order.shape[0])):
+        t = order[o]
+        ut = U(t)
+        i0, i1, i2 = U(triangles[ut, a]), U(triangles[ut, b]), U(triangles[ut, c])
+        endless = cutout[ut] < NEVER
+        bounded, box, length = (False, NO_BOX, 1.0) if endless else pixel_box(cells, places[i0], places[i1], places[i2])
+        nearest = max(inverses[i0], inverses[i1], inverses[i2]) * ABOVE / length if bounded else np.inf
+        box, most = box if bounded else whole, level(nearest)
+        if cutout[ut] == NEVER or box[2] < 0 or (bounded and _is_hidden(tiles[0], box[0], box[1], box[2], box[3], most)):
             continue
-        i0, i1, i2 = triangles[t, 0], triangles[t, 1], triangles[t, 2]
-        q0, q1, q2 = (q[i0, 0], q[i0, 1], q[i0, 2]), (q[i1, 0], q[i1, 1], q[i1, 2]), (q[i2, 0], q[i2, 1], q[i2, 2])
-        endless = cutout[t] < NEVER
+        narrow, count = box[2] - box[0] < TILE and box[3] - box[1] < TILE, U(0)
+        if narrow:
+            count = _open(farthest, box[0], box[1], box[2], box[3], most, found)
+            if count == 0:
+                continue
+        q0, q1, q2 = (q[i0, a], q[i0, b], q[i0, c]), (q[i1, a], q[i1, b], q[i1, c]), (q[i2, a], q[i2, b], q[i2, c])
         if not unit and not endless and q0[2] <= 0.0 and q1[2] <= 0.0 and q2[2] <= 0.0:
-            continue
-        small, box = (False, NO_BOX) if endless else pixel_box(faces, q0, q1, q2)
-        if small and (box[2] < 0 or _is_empty(points, box)):
             continue
         nx, ny, nz, det = plane(q0, q1, q2)
         if det == 0.0:
             continue
-        e0, e1, e2 = edges_inside(q0, q1, q2, (nx, ny, nz), det, cutout[t])
+        edges = edges_inside(q0, q1, q2, (nx, ny, nz), det, cutout[ut])
         sliver, bounds = (False, ANY_DEPTH) if endless else limits(q0, q1, q2, det, unit)
-        surface = (t, cutout[t], see_through[t], (nx, ny, nz, det), bounds)
-        count = 1 if small else touched(e0, e1, e2, sliver, levels, boxes, window, leaves)
-        for i in range(count):
-            if not small:
-                x, y = np.int64(leaves[i, 0]), np.int64(leaves[i, 1])
-                box = (x, y, x + LEAF - 1, y + LEAF - 1)
-            _cast_box(surface, (e0, e1, e2), box, rays, alpha_masks, triangles, points, solid, fragments)
+        surface = (t, cutout[ut], see_through[ut], (nx, ny, nz, det), bounds)
+        n = (nx / det, ny / det, nz / det)
+        leaf, pixels = LEAF // side, (box[0] * side, box[1] * side, (box[2] + 1) * side, (box[3] + 1) * side)
+        # A second call of `_cast_all` would keep LLVM from inlining it, which takes ten times as long.
+        for i in range(1 if narrow else touched(edges, n, sliver, levels, boxes, pixels, least, most, leaves)):
+            if not narrow:
+                x, y = np.int64(leaves[i, 0]) // side, np.int64(leaves[i, 1]) // side
+                xa, ya, xb, yb = max(x, box[0]), max(y, box[1]), min(x + leaf - 1, box[2]), min(y + leaf - 1, box[3])
+                count = _open(farthest, xa, ya, xb, yb, most, found)
+            _cast_all(surface, edges, sliver, found, count, points, alpha_masks, triangles, solid, fragments)
 
 
 @inner
-def _is_empty(points, box):
-    """Return whether no pixel of a box of rays is chosen."""
-    grid, pixels, side = points
-    xa, ya, xb, yb = box
-    empty = True
-    for y in range(ya // side, yb // side + 1):
-        empty &= pixels[first(grid, y, xa // side)] > y * grid.shape[1] + xb // side
-    return empty
+def _cast_all(surface, edges, sliver, found, count, points, alpha_masks, triangles, solid, fragments):
+    """Cast the rays of these pixels at a triangle."""
+    grid, rays, _, _, _ = points
+    nearest, seen, farthest, _ = solid
+    t, cutout, is_see_through, (nx, ny, nz, det), _ = surface
+    plain = nearest.shape[1] == FOUR and not sliver
+    level_plane = nx / det * ABOVE, ny / det * ABOVE, nz / det * ABOVE
+    for j in range(count):
+        row, column = U(found[j] >> np.uint32(16)), U(found[j] & np.uint32(0xFFFF))
+        k, least, which = U(grid[row, column]), CLOSED, np.intp(15)
+        if plain:
+            which = np.intp(along(edges, level_plane, rays, nearest, k))
+            if which == 0:
+                continue
+        for i in range(U(nearest.shape[1])):
+            if which >> i & 1:
+                ray = rays[k, U(0), i], rays[k, U(1), i], rays[k, U(2), i]
+                if plain and cutout < 0 and not is_see_through:
+                    inverse = max((nx * ray[0] + (ny * ray[1] + nz * ray[2])) / det, 0.0)
+                    if _is_before(inverse, t, nearest[k, i], seen[k, i]):
+                        nearest[k, i], seen[k, i] = inverse, t
+                else:
+                    _cast(surface, edges, ray, (k, i), alpha_masks, triangles, solid, fragments)
+            least = min(least, level(nearest[k, i]))
+        farthest[row, column] = max(farthest[row, column], least)
 
 
-@inner
-def _cast_box(surface, edges, box, rays, alpha_masks, triangles, points, solid, fragments):
-    """Draw a triangle at the chosen pixels of a box of rays (inclusive)."""
-    grid, pixels, side = points
-    height, width = grid.shape
-    xa, xb = box[0] // side, min(box[2] // side, width - 1)
-    for y in range(box[1] // side, min(box[3] // side, height - 1) + 1):
-        k = first(grid, y, xa)
-        while pixels[k] <= y * width + xb:
-            x = pixels[k] - y * width
-            for i in range(side * side):
-                ray = rays[y * side + i // side, x * side + i % side]
-                _cast(surface, edges, (ray[0], ray[1], ray[2]), (U(k), U(i)), alpha_masks, triangles, solid, fragments)
-            k += 1
+@inner(_nrt=True)
+def _least_levels(farthest, levels, side):
+    """The minimum of `farthest` in each node of a tree of rays, `side` x `side` of which belong to a pixel: (N,) int32."""
+    least = np.full(levels[-1, 0] + 1, CLOSED)
+    leaf, columns = U(LEAF // side), U(levels[0, 2])
+    for y in range(U(farthest.shape[0])):
+        for x in range(U(farthest.shape[1])):
+            node = y // leaf * columns + x // leaf
+            least[node] = min(least[node], farthest[y, x])
+    for n in range(1, len(levels)):
+        for j in range(levels[n - 1, 1]):
+            for i in range(levels[n - 1, 2]):
+                node = U(levels[n, 0] + j // 2 * levels[n, 2] + i // 2)
+                least[node] = min(least[node], least[U(levels[n - 1, 0] + j * levels[n - 1, 2] + i)])
+    return least
 
 
-@njit
+@njit(_nrt=True)
 def draw_parallel(q, order, triangles, cutout, alpha_masks, see_through, points, solid, fragments):
-    """The equivalent of `draw` along parallel rays, with vertices q of `kernels_parallel`.
-
-    `points` is (grid, pixels, offsets), `solid` (nearest, seen).
-    """
-    grid, pixels, _ = points
+    """The equivalent of `draw` along parallel rays, with vertices q of `kernels_parallel`."""
+    grid, _, offsets, reach = points
+    farthest, tiles = solid[2], solid[3]
     height, width = grid.shape
+    found = np.empty(max(width, MEDIUM * MEDIUM) + 1, np.uint32)
+    d = U(3)
     for n in range(U(order.shape[0])):
         t = order[n]
         ut = U(t)
         i, j, k = U(triangles[ut, U(0)]), U(triangles[ut, U(1)]), U(triangles[ut, U(2)])
         endless = cutout[ut] < NEVER
-        if cutout[ut] == NEVER or (not endless and max(q[i, U(3)], q[j, U(3)], q[k, U(3)]) <= 0.0):
+        if cutout[ut] == NEVER or (not endless and max(q[i, d], q[j, d], q[k, d]) <= 0.0):
             continue
         xa, ya, xb, yb = 0, 0, width - 1, height - 1
         if not endless:
-            xa, xb = _pixels(min(q[i, U(0)], q[j, U(0)], q[k, U(0)]), max(q[i, U(0)], q[j, U(0)], q[k, U(0)]), width)
-            ya, yb = _pixels(min(q[i, U(1)], q[j, U(1)], q[k, U(1)]), max(q[i, U(1)], q[j, U(1)], q[k, U(1)]), height)
-        if xa > xb or ya > yb:
+            us, vs = (q[i, U(0)], q[j, U(0)], q[k, U(0)]), (q[i, U(1)], q[j, U(1)], q[k, U(1)])
+            xa, xb = _pixels(min(us), max(us), reach, width)
+            ya, yb = _pixels(min(vs), max(vs), reach, height)
+        least = min(q[i, d], q[j, d], q[k, d])
+        most = level((ROUNDED_UP + TIE) / least if least > 0.0 and not endless else np.inf)
+        box = xa, ya, xb, yb
+        if xa > xb or ya > yb or (not endless and _is_hidden(tiles[0], xa, ya, xb, yb, most)):
             continue
+        narrow, count = xb - xa < TILE and yb - ya < TILE, U(0)
+        if narrow:
+            count = _open(farthest, xa, ya, xb, yb, most, found)
+            if count == 0:
+                continue
         area, edges, slope, bounds = surface_of(q, i, j, k, cutout[ut])
         if area == 0.0:
             continue
         checked = cutout[ut] >= 0 or see_through[ut] or (not endless and abs(area) < SLIVER)
         surface = t, cutout[ut], see_through[ut], checked, edges, slope, bounds
-        for y in range(ya, yb + 1):
-            p = first(grid, y, xa)
-            while pixels[p] <= y * width + xb:
-                _cast_parallel(surface, p, pixels[p] - y * width, y, points[2], alpha_masks, triangles, solid, fragments)
-                p += 1
+        tiled, thorough = xb - xa < MEDIUM and yb - ya < MEDIUM, yb - ya < NARROW
+        scales = crossing_at(edges[0][0], 1), crossing_at(edges[1][0], 1), crossing_at(edges[2][0], 1)
+        for y in range(ya, ya + 1 if tiled else yb + 1):
+            if tiled and not narrow:
+                count = _open_tiles(farthest, tiles[0], box, edges, checked, most, found)
+            elif not narrow:
+                span = (xa, xb) if checked else _span(edges, scales, y, xa, xb, reach)
+                count = _open_row(farthest, points, y, span, thorough, most, found)
+            _cast_parallel(surface, found, count, grid, offsets, alpha_masks, triangles, solid, fragments)
 
 
 @inner
-def _pixels(low, high, size):
+def _pixels(low, high, reach, size):
     """First and last of `size` pixels with points between two places."""
-    return math.floor(min(max(low - EPSILON, 0.0), float(size))), math.floor(min(max(high + EPSILON, -1.0), size - 1.0))
+    first = math.ceil(min(max(low - (reach[1] + EPSILON), 0.0), float(size)))
+    return first, math.floor(max(min(high - (reach[0] - EPSILON), size - 1.0), -1.0))
 
 
 @inner
-def _cast_parallel(surface, p, x, y, offsets, alpha_masks, triangles, solid, fragments):
-    """Draw a surface at the points of chosen pixel p."""
+def _cast_parallel(surface, found, count, grid, offsets, alpha_masks, triangles, solid, fragments):
+    """Draw a surface at the points of these pixels."""
     t, cutout, is_see_through, checked, edges, slope, bounds = surface
-    nearest, seen = solid
-    for m in range(nearest.shape[1]):
-        px, py = x + offsets[0, m], y + offsets[1, m]
-        inside, e0, e1, e2 = covers(edges, checked, px, py)
-        if not inside:
-            continue
-        z = depth_at(slope, bounds, px, py)
-        if z <= 0.0:
-            continue
-        inverse, at = 1.0 / z, (U(p), U(m))
-        if is_see_through:
-            if inverse * (1.0 + TIE) >= nearest[at] and hits_surface(alpha_masks, cutout, e0, e1, e2):
-                _insert(t, inverse, at, triangles, fragments)
-        elif _is_before(inverse, t, nearest[at], seen[at]) and hits_surface(alpha_masks, cutout, e0, e1, e2):
-            nearest[at] = inverse
-            seen[at] = t
+    nearest, seen, farthest, _ = solid
+    plain = not checked and nearest.shape[1] == FOUR
+    for j in range(count):
+        row, column = U(found[j] >> np.uint32(16)), U(found[j] & np.uint32(0xFFFF))
+        p, least, which = U(grid[row, column]), CLOSED, np.intp(15)
+        if plain:
+            which = np.intp(covered(edges, slope, bounds, float(np.int64(column)), float(np.int64(row)), offsets, nearest, p))
+            if which == 0:
+                continue
+        for m in range(U(nearest.shape[1])):
+            px, py, at = column + offsets[U(0), m], row + offsets[U(1), m], (p, m)
+            if which >> m & 1:
+                inside, e0, e1, e2 = (True, 0.0, 0.0, 0.0) if plain and cutout < 0 else covers(edges, checked, px, py)
+                z = depth_at(slope, bounds, px, py) if inside else 0.0
+                inverse = 1.0 / z
+                if is_see_through and z > 0.0:
+                    if inverse * (1.0 + TIE) >= nearest[at] and hits_surface(alpha_masks, cutout, e0, e1, e2):
+                        _insert(t, inverse, at, triangles, fragments)
+                elif (
+                    z > 0.0 and _is_before(inverse, t, nearest[at], seen[at]) and hits_surface(alpha_masks, cutout, e0, e1, e2)
+                ):
+                    nearest[at], seen[at] = inverse, t
+            least = min(least, level(nearest[at]))
+        farthest[row, column] = max(farthest[row, column], least)

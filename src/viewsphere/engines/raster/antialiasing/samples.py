@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
@@ -96,12 +96,21 @@ def edge_samples(
         samples = Samples(pixels, position, np.zeros((0, 3), np.float32), triangle, inverse)
     else:
         points = _Points.from_marks(camera, marks[: visibility.triangle.size].reshape(visibility.triangle.shape), 4, 1)
-        points.draw(geometry, q, np.zeros(len(geometry.triangles) + 1, np.bool_), np.arange(len(geometry.triangles)))
+        _draw_all(points, geometry, q, visibility.triangle)
         known = np.zeros(0, np.float32)
         found = points.pixels[:-1], points.nearest.astype(np.float32), points.seen, known, _ROTATED
         pixels, position, triangle, inverse = _differing(len(points.seen), *found, *look, behind)
         samples = Samples(pixels, position, _sample_rays(camera, pixels), triangle, inverse)
     return samples if len(samples.pixels) else None
+
+
+def _draw_all(points: _Points, geometry: Geometry, q: NDArray[np.float64], triangle: Int32) -> None:
+    """Draw all triangles, those that the centres around the points show (`triangle`) before the others, which they hide."""
+    is_first = np.zeros(len(geometry.triangles), np.bool_)
+    kernels_chosen.shown_around(triangle, points.pixels, is_first.view(np.uint8))
+    opaque = np.zeros(len(geometry.triangles) + 1, np.bool_)
+    for which in (is_first, ~is_first):
+        points.draw(geometry, q, opaque, np.flatnonzero(which))
 
 
 def differs_behind(visibility: Visibility, stack: Sequence[Layer], owner: Int32, normals: Float32, radiance: Float32) -> Marks:
@@ -265,24 +274,35 @@ class _Points:
             np.zeros((n, count), np.uint8),
         )
 
+    @cached_property
+    def table(self) -> tuple[int, RayTable]:
+        """The points along a side of a pixel, and the rays of a lens whose rays are neither straight nor parallel."""
+        if self.nearest.shape[1] == 1:
+            return 1, lens_table(self.camera)
+        return 2, _sample_table(self.camera.intrinsics.model_dump_json())
+
+    @cached_property
+    def rays(self) -> NDArray[np.float64]:
+        """The rays of such a lens through the points, (K, 3, M)."""
+        side, table = self.table
+        rays = np.empty((len(self.nearest), 3, side * side))
+        kernels.gather_rays(table.rays, self.pixels, side, rays)
+        return rays
+
     def draw(self, geometry: Geometry, q: NDArray[np.float64], see_through: Bool, order: NDArray[np.int64]) -> None:
         """Draw these triangles."""
         count, lens = self.nearest.shape[1], self.camera.lens
         fragments = self.inverses, self.listed, self.counts, q
         surfaces = order, geometry.triangles, geometry.triangle_cutout, geometry.alpha_masks.arrays, see_through
-        if not lens.is_linear:
-            if lens.is_parallel:
-                shown, offsets = (self.nearest, self.seen), _CENTER if count == 1 else _ROTATED
-                kernels.draw_parallel(q, *surfaces, (self.grid, self.pixels, offsets), shown, fragments)
-                return
-            side = 1 if count == 1 else 2
-            table = lens_table(self.camera) if side == 1 else _sample_table(self.camera.intrinsics.model_dump_json())
-            solid = self.nearest, self.seen
-            kernels.draw_rays(q, *surfaces, lens.has_unit_rays, table.arrays, (self.grid, self.pixels, side), solid, fragments)
-            return
-        offsets, reach = (_CENTER, _CENTER_REACH) if count == 1 else (_ROTATED, _ROTATED_REACH)
         solid = self.nearest, self.seen, self.farthest, kernels_chosen.tiled(self.farthest)
-        kernels.draw(q, *surfaces, (self.grid, self.pixels, offsets, reach), solid, fragments)
+        if lens.is_straight:
+            offsets, reach = (_CENTER, _CENTER_REACH) if count == 1 else (_ROTATED, _ROTATED_REACH)
+            draw = kernels.draw_parallel if lens.is_parallel else kernels.draw
+            draw(q, *surfaces, (self.grid, self.pixels, offsets, reach), solid, fragments)
+            return
+        side, table = self.table
+        points = self.grid, self.rays, side, *table.placed(q)
+        kernels.draw_rays(q, *surfaces, lens.has_unit_rays, table.arrays, points, solid, fragments)
 
 
 def _differs_from_neighbour(triangle: Int32, depth: Float32, owner: Int32, normals: Float32) -> NDArray[np.uint8]:
@@ -386,4 +406,4 @@ def _sample_table(lens: str) -> RayTable:
     for i, (x, y) in enumerate(OFFSETS):
         shifted = intrinsics.model_copy(update={"cx": intrinsics.cx - (x - 0.5), "cy": intrinsics.cy - (y - 0.5)})
         rays[i // 2 :: 2, i % 2 :: 2] = pixel_rays(shifted)
-    return index_rays(intrinsics, rays, 2)
+    return index_rays(intrinsics, rays, 1, 2)
