@@ -86,7 +86,10 @@ def test_coco_has_two_annotations_of_an_object_across_the_seam(dataset):
     if not (dataset.root / "coco").exists():
         export(dataset.root, ["coco"])
     files = (dataset.root / "coco" / "annotations").glob("*.json")
-    annotations = [one for file in files for one in json.loads(file.read_text("utf-8"))["annotations"]]
+    whole = [json.loads(file.read_text("utf-8")) for file in files]
+    annotations = [one for part in whole for one in part["annotations"]]
+    matrices = [image["transformation_matrix"].keys() for part in whole for image in part["images"]]
+    assert len(matrices) == len(dataset) and all(names == {"K", "RT"} for names in matrices)  # P, of pinholes, has no meaning
     assert len({one["id"] for one in annotations}) == len(annotations)
     for sample, o in across(dataset):
         mine = [one for one in annotations if one["image_id"] == sample.index + 1 and one["id_object"] == o.id]

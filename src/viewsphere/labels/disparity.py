@@ -3,21 +3,33 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import Field as Limits
 
 from viewsphere.labels.shared.needs import Partner, no_disparity
 from viewsphere.labels.shared.spec import ChannelLabel, Drawing, Extent, Models, Picture, channel_of
+from viewsphere.model.fields.frozen import Frozen
 from viewsphere.model.sample import Sample
 
 if TYPE_CHECKING:
     from viewsphere.labels.shared.context import LabelContext
 
 
+class _Options(Frozen):
+    """Options of the label disparity."""
+
+    unit: Literal["pixels", "degrees"] = Limits(
+        default="pixels",
+        description="pixels of the pictures; degrees: the angle between the directions in which both cameras see the point",
+    )
+
+
 def _compute(context: LabelContext) -> NDArray[np.float32]:
-    """fx baseline / z, (H, W) pixels, positive in both pictures of the pair; 0 for the sky.
+    """fx baseline / z, (H, W) pixels, positive in both pictures of the pair; 0 for the sky. Of panoramas one above the other:
+    the rows between both positions of the point.
 
     The other picture is from the first sensor of the rig that is rectified with the picture's own. NaN without such a sensor,
     and where a flat picture is seen.
@@ -26,10 +38,30 @@ def _compute(context: LabelContext) -> NDArray[np.float32]:
     if baseline is None or own is None:
         out.fill(np.nan)
         return out
-    np.multiply(context.inverse_depth, context.camera.intrinsics.fx * baseline, out=out, casting="same_kind")
+    if context.options_of("disparity", _Options).unit == "degrees":
+        out[...] = _parallax(context)
+    elif context.camera.lens.is_linear:
+        np.multiply(context.inverse_depth, context.camera.intrinsics.fx * baseline, out=out, casting="same_kind")
+    else:
+        out[...] = np.abs(_there(context)[..., 1] - (np.arange(len(out)) + 0.5)[:, None])
     if not own.is_sky_endless:
         out[context.visibility.triangle < 0] = np.nan
     return out
+
+
+def _there(context: LabelContext) -> NDArray[np.float64]:
+    """Positions of the seen points in the other picture, (H, W, 2) pixels."""
+    match = context.match(Partner())
+    assert match is not None
+    return match.xy
+
+
+def _parallax(context: LabelContext) -> NDArray[np.float64]:
+    """Angles (H, W), degrees, between the directions in which both cameras, whose axes are equal, see the points."""
+    lens = context.camera.lens
+    here, there = lens.directions(), lens.rays(_there(context)).directions
+    away = np.linalg.norm(np.cross(here, there), axis=-1)
+    return np.degrees(np.arctan2(away, (here * there).sum(axis=-1)))
 
 
 def _prove(sample: Sample, models: Models) -> Iterator[str]:
@@ -60,7 +92,9 @@ def _picture(disparity: NDArray[np.float32], within: Extent | None = None) -> Pi
 
 LABEL = ChannelLabel(
     name="disparity",
-    meaning="x in the left picture less x in the right one, of the rectified pair",
+    meaning="x in the left picture less x in the right one, of the rectified pair; of panoramas, y in the upper picture less y "
+    "in the lower one",
+    options=_Options,
     axes="image",
     needs=(Partner(),),
     refuses=no_disparity,

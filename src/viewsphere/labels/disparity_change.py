@@ -15,6 +15,7 @@ from viewsphere.truth.surface_points.raster import in_lens
 
 if TYPE_CHECKING:
     from viewsphere.labels.shared.context import LabelContext
+    from viewsphere.model.sensors.camera import Intrinsics
 
 
 def _compute(context: LabelContext) -> NDArray[np.float32]:
@@ -56,12 +57,19 @@ def _picture(change: NDArray[np.float32], within: Extent | None = None) -> Pictu
     return np.where(known[..., None], np.stack((red, other, blue), axis=-1), 0).astype(np.uint8)
 
 
+def _refuses(intrinsics: Intrinsics) -> str | None:
+    """The reason why pictures of this lens have no change of disparity; None if they have."""
+    if not intrinsics.lens.has_depth:
+        return f"expected a lens with z-depth, from which it follows; found {intrinsics.lens.name}: leave it out"
+    return no_disparity(intrinsics)
+
+
 LABEL = ChannelLabel(
     name="disparity_change",
     meaning="the seen point's disparity one instant later, less its disparity",
     axes="image",
     needs=(Next(), Partner()),
-    refuses=no_disparity,
+    refuses=_refuses,
     dtype=np.float32,
     unit="px",
     empty=np.nan,

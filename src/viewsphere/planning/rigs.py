@@ -248,7 +248,14 @@ def _sized(found: Calibrated, lens: Intrinsics) -> Intrinsics:
 
 def _check_disparity(recipe: Recipe, rig: Rig) -> None:
     asked = next((name for name in recipe.channels if (label := label_named(name)) and requires(label.needs, Partner)), None)
-    if asked and not rig.rectified:
+    if asked and not (rig.rectified or rig.stacked):
+        lenses = [sensor.intrinsics.lens for sensor in rig.sensors if sensor.lidar is None]
+        if not any(lens.has_depth for lens in lenses):
+            raise RecipeError(
+                f"channels: expected a rig of two equal panoramas with equal axes, one above the other, for {asked}; found "
+                "none: in panoramas beside each other, points move across columns and rows, and not at all on the line through "
+                "both cameras: set position: [0, 0.2, 0] of the lower one"
+            )
         raise RecipeError(
             f"channels: expected a rig with two rectified sensors (equal pinhole lenses and axes, one to the "
             f"right of the other) for {asked}; found none: set rig: {{kind: stereo, baseline: 0.1}}, rectified: true beside a "

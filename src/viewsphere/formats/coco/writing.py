@@ -32,6 +32,7 @@ from viewsphere.formats.shared.writing.paper import faces, json_bytes, transform
 from viewsphere.geometry.mask import mask_polygons
 from viewsphere.model.channel import missing
 from viewsphere.model.sample import Box, ObjectAnnotation, Sample
+from viewsphere.model.sensors.camera import Camera
 from viewsphere.store.credits import credited
 from viewsphere.store.samples.seam_pieces import PIECE
 
@@ -287,9 +288,14 @@ def _image(dataset: Dataset, sample: Sample) -> dict[str, Any]:
         "elevation": pose.elevation_deg,
         "azimuth": pose.azimuth_deg,
         "tilt": pose.tilt_deg,
-        "transformation_matrix": {**transformation_matrix(camera), "P": camera.P.tolist()},
+        "transformation_matrix": transformation_matrix(camera) | _projection(camera),
         "distortion": camera.lens.record,
     }
+
+
+def _projection(camera: Camera) -> dict[str, list[list[float]]]:
+    """P (3, 4), world to pixels without the lens' distortion; none for panoramas, whose K maps angles."""
+    return {"P": camera.P.tolist()} if camera.lens.has_depth else {}
 
 
 def _foreign_annotation(o: ObjectAnnotation, own: Mapping[str, int], names: Names) -> dict[str, Any]:

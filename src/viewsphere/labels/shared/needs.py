@@ -107,7 +107,9 @@ class Poses(_OfTime["Moment | None"]):
 
 
 class Partner(Need["View | None"]):
-    """The view of the first sensor that is rectified with the picture's own; None without one."""
+    """The view of the first sensor that is rectified with the picture's own, or of the first panorama above or below it; None
+    without one.
+    """
 
     SECTION: ClassVar[str] = "rig"
     PURPOSE: ClassVar[str] = "with a sensor that is rectified with its own"
@@ -237,8 +239,6 @@ def requires(needs: tuple[Need[Any], ...], kind: type[Need[Any]]) -> bool:
 
 def no_disparity(intrinsics: Intrinsics) -> str | None:
     """The reason why pictures of this lens have no disparity; None if they have."""
-    if not intrinsics.lens.has_depth:
-        return f"expected a lens with z-depth, from which disparity follows; found {intrinsics.lens.name}: leave it out"
     if not intrinsics.lens.is_parallel:
         return None
     return (

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from itertools import permutations
 from typing import NamedTuple
 
@@ -44,7 +45,9 @@ class Sensor(OmitNone):
 
 
 class Pair(NamedTuple):
-    """Two sensors of a rig, by their places in it, whose pictures are rectified, and the metres between them."""
+    """Two sensors of a rig, by their places in it, whose pictures are rectified, and the metres between them; of panoramas,
+    `left` is the upper one.
+    """
 
     left: int
     right: int
@@ -68,13 +71,26 @@ class Rig(Frozen):
     @property
     def rectified(self) -> tuple[Pair, ...]:
         """The pairs of sensors with equal pinhole lenses and equal axes, one of them on the other's x axis."""
+        return tuple(pair for pair in self._pairs if self.sensors[pair.left].intrinsics.lens.is_linear)
+
+    @property
+    def stacked(self) -> tuple[Pair, ...]:
+        """The pairs of sensors with equal panoramas and equal axes, one of them on the other's y axis: points move along
+        columns.
+        """
+        return tuple(pair for pair in self._pairs if not self.sensors[pair.left].intrinsics.lens.is_linear)
+
+    @property
+    def _pairs(self) -> Iterator[Pair]:
         numbered = permutations(enumerate(self.sensors), 2)
         pairs = ((i, j, _baseline(left, right)) for (i, left), (j, right) in numbered)
-        return tuple(Pair(i, j, baseline) for i, j, baseline in pairs if baseline is not None)
+        return (Pair(i, j, baseline) for i, j, baseline in pairs if baseline is not None)
 
     def partner(self, sensor: int) -> tuple[str, float] | None:
-        """Name of the first sensor that is rectified with this one (counted from 0), and their distance in metres; or None."""
-        pairs = self.rectified
+        """Name of the first sensor that is rectified with this one (counted from 0), or of the first panorama above or below
+        it, and their distance in metres; or None.
+        """
+        pairs = tuple(self._pairs)
         beside = sorted((right if left == sensor else left, b) for left, right, b in pairs if sensor in (left, right))
         return (self.sensors[beside[0][0]].name, beside[0][1]) if beside else None
 
@@ -89,11 +105,15 @@ STRAIGHT = 1e-9
 
 
 def _baseline(left: Sensor, right: Sensor) -> float | None:
-    """Metres from the left sensor to the right one along x, None if they are not rectified in this order."""
-    if left.intrinsics != right.intrinsics or not left.intrinsics.lens.is_linear:
+    """Metres from the left sensor to the right one along x, or from the upper panorama to the lower one along y; None if they
+    are not rectified in this order.
+    """
+    lens = left.intrinsics.lens
+    if left.intrinsics != right.intrinsics or not (lens.is_linear or not lens.has_depth):
         return None
     a, b = np.array(left.rig_from_sensor), np.array(right.rig_from_sensor)
     if np.abs(a[:3, :3] - b[:3, :3]).max() > STRAIGHT:
         return None
     x, y, z = transform(a[:3, :3].T, b[:3, 3] - a[:3, 3]).tolist()
-    return x if x > 0 and max(abs(y), abs(z)) <= STRAIGHT * x else None
+    along, beside = (x, y) if lens.is_linear else (y, x)
+    return along if along > 0 and max(abs(beside), abs(z)) <= STRAIGHT * along else None
