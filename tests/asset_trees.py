@@ -36,9 +36,10 @@ def put(file: Path, text: str) -> Path:
     return file
 
 
-def planned(source: str, folder: Path | None = None, **entry: object) -> Plan:
+def planned(source: str, folder: Path | None = None, splits: dict[str, object] | None = None, **entry: object) -> Plan:
     """The plan of one picture of each model of a source."""
-    data = {"models": [{"source": source, **entry}], "viewpoints": {"distance": 3.0, "azimuth": [0]}, "channels": ["rgb"]}
+    data: dict[str, object] = {} if splits is None else {"splits": splits}
+    data |= {"models": [{"source": source, **entry}], "viewpoints": {"distance": 3.0, "azimuth": [0]}, "channels": ["rgb"]}
     return plan(Recipe.model_validate(data, context={"folder": folder} if folder else None))
 
 

@@ -29,7 +29,7 @@ def recipe(models, **fields):
 
 def test_70_to_30_of_ten_is_seven_and_three():
     assert quotas({"train": 0.7, "val": 0.3}, 10) == {"train": 7, "val": 3}
-    found = dealt(splits_of({"train": 0.7, "val": 0.3}), 1, [f"car_{i}" for i in range(10)], {})
+    found = dealt(splits_of({"train": 0.7, "val": 0.3}), 1, [f"car_{i}" for i in range(10)], {}, {})
     assert Counter(found.values()) == {"train": 7, "val": 3}
 
 
@@ -46,13 +46,13 @@ def test_quotas_are_all_of_them_near_their_shares_and_none_is_empty(shares, coun
 @given(SHARES, KEYS, st.integers(0, 9), st.randoms())
 def test_the_order_of_models_does_not_matter(shares, keys, seed, random):
     shuffled = random.sample(keys, len(keys))
-    assert dealt(splits_of(shares), seed, shuffled, {}) == dealt(splits_of(shares), seed, keys, {})
+    assert dealt(splits_of(shares), seed, shuffled, {}, {}) == dealt(splits_of(shares), seed, keys, {}, {})
 
 
 @given(SHARES, KEYS, st.integers(0, 30), st.integers(0, 9))
 def test_models_that_come_later_move_none(shares, keys, cut, seed):
-    before = dealt(splits_of(shares), seed, keys[:cut], {})
-    after = dealt(splits_of(shares), seed, keys[::-1], before)
+    before = dealt(splits_of(shares), seed, keys[:cut], {}, {})
+    after = dealt(splits_of(shares), seed, keys[::-1], before, {})
     assert {key: after[key] for key in before} == before
     new = Counter(after[key] for key in keys[cut:])
     assert new == Counter({name: n for name, n in quotas(shares, len(keys[cut:])).items() if n})

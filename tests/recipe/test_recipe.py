@@ -307,7 +307,7 @@ MISTAKES = [
         "",
     ),
     ({"splits": {"train": 0.7, "val": 0.2}}, "splits: expected shares that add up to 1; found train 0.7", "0.9"),
-    ({"splits": {"train": "most"}}, "splits.train: expected a share of 0 to 1 or a list", ""),
+    ({"splits": {"train": "most"}}, "splits.train: expected a share of 0 to 1, a list", ""),
     ({"splits": {"by": "pose", "train": 1, "val": ["a"]}}, "splits: expected by: model", ""),
     ({"splits": {"a/b": 1}}, "splits: expected names of letters", ""),
     ({"label_alpha": 0}, "label_alpha: expected a number greater than 0", ""),

@@ -35,7 +35,7 @@ class ModelSpec(OmitNone):
     its file's first frame. The motion of its thing determines its time step at each instant.
     """
 
-    OMIT_IF_NONE = ("fps", "sidecar", "symmetries", "keypoints", "color", "material", "size", "faces")
+    OMIT_IF_NONE = ("fps", "sidecar", "symmetries", "keypoints", "color", "material", "size", "faces", "split")
 
     key: str  # unique and stable in the data set: also the name of its folder
     source: str
@@ -60,6 +60,7 @@ class ModelSpec(OmitNone):
     symmetries: Literal["found"] | None = None  # whether to search for symmetries if none are declared
     keypoints: int | None = None  # how many are spread over its surface where none are named
     faces: Literal["as_file"] | None = None  # single-sided materials are visible from the front only; None: all from both sides
+    split: str | None = None  # the split in which its set of models lists it
     color: Word | None = None  # colour in captions, if not the one from its sidecar or its surface
     material: Word | None = None  # likewise for its material
 

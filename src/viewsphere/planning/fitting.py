@@ -141,7 +141,7 @@ def _check_splits(planned: Plan, part: Part) -> None:
     before, now = Splits.model_validate(part.recipe["splits"]), planned.recipe.splits
     if _shares(before) != _shares(now):
         raise RecipeError(f"splits: expected {_shares(before)}, as the data set has; found {_shares(now)}: {FITTING}")
-    listed = {key: name for name, some in now.shares.items() if isinstance(some, tuple) for key in some}
+    listed = now.listed({spec.key: spec.split for spec in planned.model_specs if spec.split is not None})
     for key, split in part.dealt_splits.items():
         if listed.get(key, split) != split:
             raise RecipeError(
@@ -150,7 +150,7 @@ def _check_splits(planned: Plan, part: Part) -> None:
 
 
 def _shares(splits: Splits) -> str:
-    parts = (f"{name} {'listed' if isinstance(part, tuple) else f'{part:g}'}" for name, part in splits.shares.items())
+    parts = (f"{name} {f'{part:g}' if isinstance(part, (int, float)) else 'listed'}" for name, part in splits.shares.items())
     return f"{', '.join(parts)} by {splits.by}"
 
 

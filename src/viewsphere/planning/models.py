@@ -125,6 +125,7 @@ def numbered_specs(recipe: Recipe) -> tuple[tuple[ModelSpec, int], ...]:
             symmetries="found" if entry.symmetries == "found" else None,
             keypoints=entry.keypoints,
             faces="as_file" if entry.faces == "as_file" else None,
+            split=facts.split or None,
             color=entry.color,
             material=entry.material,
         )

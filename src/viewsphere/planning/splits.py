@@ -12,7 +12,7 @@ from viewsphere.recipe.recipe import Splits
 
 def shared(splits: Splits) -> dict[str, float]:
     """The splits that have a share of the unlisted models or scenes, in the recipe's order."""
-    return {name: part for name, part in splits.shares.items() if not isinstance(part, tuple) and part}
+    return {name: part for name, part in splits.numbers.items() if part}
 
 
 def drawn_split(shares: Mapping[str, float], seed: int, names: tuple[str, ...]) -> str:
@@ -21,15 +21,18 @@ def drawn_split(shares: Mapping[str, float], seed: int, names: tuple[str, ...]) 
     return tuple(shares)[min(bisect_right(edges, share(seed, "split", *names)), len(shares) - 1)]
 
 
-def dealt(splits: Splits, seed: int, keys: Iterable[str], kept: Mapping[str, str]) -> dict[str, str]:
-    """The split of each model or scene: its split in `kept`, or the one that lists it; the others are assigned by quotas.
+def dealt(
+    splits: Splits, seed: int, keys: Iterable[str], kept: Mapping[str, str], of_sets: Mapping[str, str]
+) -> dict[str, str]:
+    """The split of each model or scene: its split in `kept`, or the one that lists it, by its key or by its set (`of_sets`);
+    the others are assigned by quotas.
 
     Quotas are each split's share of these others, rounded by largest remainders so that they add up. No quota is 0 if there are
     at least as many others as splits. They are assigned in the order of their hashes, so that the order of lists does not
     matter.
     """
     shares = shared(splits)
-    listed = {key: name for name, some in splits.shares.items() if isinstance(some, tuple) for key in some}
+    listed = splits.listed(of_sets)
     split_of = {key: kept.get(key) or listed.get(key, "") for key in keys}
     rest = sorted((share(seed, "split", key), key) for key, name in split_of.items() if not name)
     names = (name for name, count in quotas(shares, len(rest)).items() for _ in range(count))

@@ -83,18 +83,31 @@ Shares = Annotated[Interval, AfterValidator(_shares)]
 BEFORE_RENDERING = {"name", "formats", "max_frames", "shot_frames", "keep_annotations_above"}
 """Fields of a recipe that change neither pictures nor labels, such as the credits of its models."""
 
+
+def _set(value: Any) -> Any:
+    if value != "set":
+        raise ValueError(f"{SHARE}; found {shown(value)}")
+    return value
+
+
+SHARE = "expected a share of 0 to 1, a list of model keys, or set"
+
 Share = Annotated[
-    Annotated[Number, Field(ge=0, le=1), Tag("number")] | Annotated[tuple[str, ...], Tag("list")],
+    Annotated[Number, Field(ge=0, le=1), Tag("number")]
+    | Annotated[tuple[str, ...], Tag("list")]
+    | Annotated[Literal["set"], BeforeValidator(_set), Tag("text")],
     Discriminator(
         shape_of,
         custom_error_type="share",
-        custom_error_message="expected a share of 0 to 1 or a list of model keys",
+        custom_error_message=SHARE,
     ),
 ]
 
 
 class Splits(Frozen):
-    """The splits of the frames: `by`, and every split's share or the keys of its models."""
+    """The splits of the frames: `by`, and every split's share, the keys of its models, or `set`: those that their set lists in
+    the split of this name.
+    """
 
     model_config = ConfigDict(extra="allow")
     __pydantic_extra__: dict[str, Share] = Field(init=False)  # pyright: ignore[reportIncompatibleVariableOverride]
@@ -125,7 +138,7 @@ class Splits(Frozen):
                 raise ValueError(
                     f"splits {other!r} and {name!r} differ only in capitals, which some file systems ignore: rename one"
                 )
-        numbers = {name: share for name, share in self.shares.items() if not isinstance(share, tuple)}
+        numbers = self.numbers
         if numbers and abs(sum(numbers.values()) - 1) > 1e-6:
             added = " + ".join(f"{name} {share:g}" for name, share in numbers.items())
             raise ValueError(f"expected shares that add up to 1; found {added} = {sum(numbers.values()):g}")
@@ -134,9 +147,20 @@ class Splits(Frozen):
         return self
 
     @property
-    def shares(self) -> dict[str, float | tuple[str, ...]]:
-        """Split -> its share, or the keys of its models; in the recipe's order."""
+    def shares(self) -> dict[str, float | tuple[str, ...] | Literal["set"]]:
+        """Split -> its share, the keys of its models, or `set`; in the recipe's order."""
         return dict(self.__pydantic_extra__)
+
+    @property
+    def numbers(self) -> dict[str, float]:
+        """Split -> its share, without splits of listed models."""
+        return {name: share for name, share in self.shares.items() if isinstance(share, (int, float))}
+
+    def listed(self, of_sets: Mapping[str, str]) -> dict[str, str]:
+        """The key of each listed model -> its split; `of_sets` are the splits of models in their sets, by their keys."""
+        shares = self.shares
+        listed = {key: name for key, name in of_sets.items() if shares.get(name) == "set"}
+        return listed | {key: name for name, some in shares.items() if isinstance(some, tuple) for key in some}
 
 
 def _distinct(names: tuple[str, ...]) -> tuple[str, ...]:

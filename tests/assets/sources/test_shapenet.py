@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import json
 
+import pytest
+
 from asset_trees import faces_front, planned, pointer, put
+from viewsphere.errors import RecipeError
 
 CAR, CHAIR, MODEL = "02958343", "03001627", "1a2b3c"
 
@@ -36,3 +39,15 @@ def test_the_folders_taxonomy_names_further_synsets(tmp_path):
     assert planned(f"shapenet:{tmp_path}").model_specs[0].category == "hovercraft"
     put(tmp_path / "taxonomy.json", "[{")
     assert planned(f"shapenet:{tmp_path}").models == 1
+
+
+def test_models_have_the_splits_of_the_folders_table(tmp_path):
+    for name in ("a", "b", "c"):
+        put(tmp_path / CAR / name / "models" / "model_normalized.obj", pointer("+y", "-z"))
+    put(tmp_path / "all.csv", f"id,synsetId,subSynsetId,modelId,split\n1,{CAR},{CAR},a,val\n2,{CAR},{CAR},b,train\nbroken\n")
+    plan = planned(f"shapenet:{tmp_path}", splits={"train": 1, "val": "set"})
+    assert [plan.split(spec.key, 0) for spec in plan.model_specs] == ["val", "train", "train"]
+    with pytest.raises(RecipeError, match=rf"splits: expected every model to be listed; found no split for '{CAR}_c'"):
+        planned(f"shapenet:{tmp_path}", splits={"train": "set", "val": "set"})
+    with pytest.raises(RecipeError, match=r"splits.val: expected a share of 0 to 1, a list of model keys, or set"):
+        planned(f"shapenet:{tmp_path}", splits={"train": 1, "val": {"a": 1}})

@@ -264,7 +264,8 @@ def _check_listed(recipe: Recipe, specs: tuple[ModelSpec, ...]) -> None:
                     f"splits.{name}: expected every model in one split; found {key!r}, listed in {seen[key]!r} too"
                 )
             seen[key] = name
-    if all(isinstance(s, tuple) for s in recipe.splits.shares.values()) and keys - seen.keys():
+    seen |= recipe.splits.listed({spec.key: spec.split for spec in specs if spec.split is not None})
+    if not recipe.splits.numbers and keys - seen.keys():
         raise RecipeError(f"splits: expected every model to be listed; found no split for {min(keys - seen.keys())!r}")
 
 

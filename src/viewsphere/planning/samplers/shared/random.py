@@ -279,7 +279,7 @@ def _too_few(entry: ScenesEntry, there: int, models: int, split: str) -> str:
 def _shares(context: SamplingContext) -> dict[str, float]:
     """The share of the scenes in each split, if splits are by model."""
     splits = context.recipe.splits
-    if not any(isinstance(part, tuple) for part in splits.shares.values()):
+    if len(splits.numbers) == len(splits.shares):
         return shared(splits)
     return {name: count / context.models for name, count in sorted(Counter(context.dealt_splits.values()).items())}
 

@@ -168,7 +168,8 @@ class SamplingContext(Sendable):
         names: Mapping[str, Sequence[str]] = {"model": tuple(self.position), "scene": self.subjects}
         if by == "sequence":
             names = {by: tuple(chain.from_iterable(self._sequences))}
-        return dealt(self.recipe.splits, self.recipe.lasting_seed, names.get(by, ()), self.kept_splits)
+        of_sets = {spec.key: spec.split for spec in self.model_specs if spec.split is not None}
+        return dealt(self.recipe.splits, self.recipe.lasting_seed, names.get(by, ()), self.kept_splits, of_sets)
 
     @property
     def _sequences(self) -> Iterator[Iterator[str]]:
