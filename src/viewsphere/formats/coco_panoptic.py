@@ -107,6 +107,7 @@ preparer, writer, verify = functions(_CocoPanoptic)
 
 FORMAT = FormatSpec(
     parallel_rays=True,
+    rolling=True,
     about=__doc__,
     holds=("panoptic masks", "boxes"),
     read_by=("panopticapi", "datumaro"),

@@ -163,6 +163,7 @@ def _frame_of(row: bytes) -> int | None:
 
 FORMAT = FormatSpec(
     parallel_rays=True,
+    rolling=True,
     about=__doc__,
     holds=("boxes", "poses", "views", "sizes"),
     read_by=("pandas", "any spreadsheet"),

@@ -111,6 +111,7 @@ preparer, writer, verify = functions(Matrix)
 
 FORMAT = FormatSpec(
     parallel_rays=True,
+    rolling=True,
     about=__doc__,
     holds=("boxes", "truncation"),
     read_by=("supervision", "its own training code"),

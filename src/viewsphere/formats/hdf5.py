@@ -168,7 +168,11 @@ def _camera(sample: Sample) -> dict[str, Any]:
     camera, bent = sample.camera, sample.camera.lens.flat_record
     matrix = camera.K - [[0, 0, 0.5], [0, 0, 0.5], [0, 0, 0]]
     told = {"cam_K": matrix, "cam_R_w2c": camera.R, "cam_t_w2c": camera.t}
-    return {key: value.ravel().tolist() for key, value in told.items()} | ({"distortion": bent} if bent else {})
+    return (
+        {key: value.ravel().tolist() for key, value in told.items()}
+        | ({"distortion": bent} if bent else {})
+        | (camera.shutter_record)
+    )
 
 
 def _library() -> Any:
@@ -185,6 +189,7 @@ preparer, writer, verify = functions(_Hdf5)
 
 FORMAT = FormatSpec(
     parallel_rays=True,
+    rolling=True,
     about=__doc__,
     holds=("pictures", "depth", "normals", "masks", "NOCS", "flow", "poses", "cameras"),
     read_by=("h5py", "BlenderProc"),

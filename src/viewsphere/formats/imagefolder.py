@@ -124,6 +124,7 @@ preparer, writer, verify = functions(ImageFolder)
 
 FORMAT = FormatSpec(
     parallel_rays=True,
+    rolling=True,
     about=__doc__,
     holds=("the class of a picture", "viewpoints"),
     read_by=("torchvision", "datasets"),

@@ -109,6 +109,7 @@ preparer, writer, verify = functions(_Mot)
 
 FORMAT = FormatSpec(
     parallel_rays=True,
+    rolling=True,
     about=__doc__,
     holds=("boxes", "tracks of objects", "visibility"),
     read_by=("motmetrics", "TrackEval", "datumaro"),

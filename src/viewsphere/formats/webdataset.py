@@ -183,6 +183,7 @@ def _npy(array: NDArray[Any]) -> bytes:
 
 FORMAT = FormatSpec(
     parallel_rays=True,
+    rolling=True,
     about=__doc__,
     holds=("everything",),
     read_by=("webdataset", "wids"),

@@ -24,8 +24,8 @@ def _compute(context: LabelContext) -> NDArray[np.float32]:
     """Weights (H, W, 3) of the seen triangle's corners; 0 where nothing is seen."""
     from viewsphere.truth.raster import kernels_channels as kernels
 
-    out = context.empty(np.float32, 3)
-    kernels.barycentrics(context.visibility.triangle, context.geometry.triangles, context.corners, context.rays, out)
+    out, shown = context.empty(np.float32, 3), context.shown
+    kernels.barycentrics(shown.seen, shown.triangles, shown.corners, context.rays, out)
     return out
 
 

@@ -25,10 +25,14 @@ def _compute(context: LabelContext, i: int) -> Mapping[str, Any]:
     visible pixels. Otherwise surface nearer than the near limit of projected boxes would be in no box.
     """
     bounds, whole = context.projected[i]
-    projected = _clipped(bounds, context.camera)
-    if not whole and context.instances.area[i + 1]:
+    rolls, seen = context.camera.rows is not None, None
+    if (rolls or not whole) and context.instances.area[i + 1]:
         x0, y0, x1, y1 = _seen(context, i)
         seen = x0 + 0.5, y0 + 0.5, x1 - 0.5, y1 - 0.5
+    if rolls and bounds and seen:  # a rolling shutter may show a part twice
+        bounds = united(bounds, seen, None)
+    projected = _clipped(bounds, context.camera)
+    if not whole and seen:
         projected = united(projected or seen, seen, context.camera.lens.period)
     return {"box2d_projected": projected, "box2d_unclipped": bounds if whole else None}
 
@@ -67,7 +71,7 @@ def _prove(sample: Sample, models: Models) -> Iterator[str]:
             yield f"object {o.id}: expected the visible box in the projected one, found {tight} and {around}"
         if unclipped and around != _clipped(unclipped, sample.camera):
             yield f"object {o.id}: expected box2d_projected to be the clipped {unclipped}, found {around}"
-        if unclipped and sample.camera.lens.is_straight and o.box3d_in_front.all():
+        if unclipped and sample.camera.rows is None and sample.camera.lens.is_straight and o.box3d_in_front.all():
             x, y = o.box3d_pixels.T
             if not _within(unclipped, (x.min(), y.min(), x.max(), y.max()), 1e-3):
                 yield f"object {o.id}: expected box2d_unclipped within the projected 3D box, found {unclipped}"

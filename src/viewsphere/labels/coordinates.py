@@ -22,9 +22,9 @@ def _compute(context: LabelContext) -> NDArray[np.float32]:
     """The seen point in its object's axes, (H, W, 3) metres; NaN on scenery, on ground, and where nothing is seen."""
     from viewsphere.truth.raster import kernels_channels as kernels
 
-    out, g = context.empty(np.float32, 3), context.geometry
-    seen = context.visibility.triangle
-    kernels.coordinates(seen, g.triangles, g.triangle_object, context.corners, context.rays, g.coordinates, out)
+    out, shown = context.empty(np.float32, 3), context.shown
+    values = shown.of_vertices(context.geometry.coordinates)
+    kernels.coordinates(shown.seen, shown.triangles, shown.objects, shown.corners, context.rays, values, out)
     return out
 
 

@@ -176,6 +176,7 @@ LABEL = ChannelLabel(
     meaning="depth as a depth camera measures it, with noise, steps and holes",
     axes="camera",
     needs=(Randomness(),),
+    one_pose=True,
     refuses=_refuses,
     options=_Options,
     dtype=np.float32,

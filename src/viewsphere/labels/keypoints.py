@@ -171,6 +171,7 @@ LABEL = ObjectLabel(
     meaning="its model's named points",
     on_request=True,
     needs=(OwnView(),),
+    one_pose=True,
     options=_Options,
     fields=(
         Field("keypoint_names", "names of the points; the data set's models have skeletons and flips, too", str, many=True),

@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from viewsphere.geometry.rotation import transform
-from viewsphere.labels.shared.point_checks import ROUNDING, largest, misplaced
+from viewsphere.labels.shared.point_checks import ROUNDING, in_camera_axes, in_world_axes, largest, misplaced
 from viewsphere.labels.shared.spec import Array, ChannelLabel, Drawing, Models, Picture, channel_of, rendered
 from viewsphere.model.sample import ObjectAnnotation, Sample
 
@@ -34,8 +33,9 @@ def _compute(context: LabelContext) -> NDArray[np.float32]:
     boxes = np.zeros((g.object_count + 1, 2, 3))
     kernels.own_boxes(g.coordinates, g.is_used, np.array(g.vertex_start, np.int64), context.instances.area, boxes)
     middle, (x, y, z) = (boxes[:, 0] + boxes[:, 1]) / 2, (boxes[:, 1] - boxes[:, 0]).T
-    seen, diagonal = context.visibility.triangle, np.sqrt(x * x + y * y + z * z)
-    kernels.nocs(seen, g.triangles, g.triangle_object, context.corners, context.rays, g.coordinates, middle, diagonal, out)
+    shown, diagonal = context.shown, np.sqrt(x * x + y * y + z * z)
+    values = shown.of_vertices(g.coordinates)
+    kernels.nocs(shown.seen, shown.triangles, shown.objects, shown.corners, context.rays, values, middle, diagonal, out)
     return out
 
 
@@ -66,7 +66,7 @@ def _of_object(sample: Sample, o: ObjectAnnotation, shares: Array, own: NDArray[
         if wrong.any():
             yield f"object {o.id}: expected shares of its coordinates, found others at {wrong.sum()} pixels"
     if sample.known_camera is not None:
-        placed = transform(o.camera_from_object, points)
+        placed = in_camera_axes(sample, in_world_axes(sample, o, points, own), own)
         away = np.abs(o.camera_from_object[:3, 3]).max() + largest(placed)
         wrong = misplaced(sample, placed, own, slack + 2 * ROUNDING * away)
         if wrong.any():

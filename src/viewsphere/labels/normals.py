@@ -24,10 +24,12 @@ def _shading_normals(context: LabelContext) -> NDArray[np.float32]:
     """
     from viewsphere.truth.raster import kernels_channels as kernels
 
-    out, g = context.empty(np.float32, 3), context.geometry
+    out, shown = context.empty(np.float32, 3), context.shown
+    g, rotation = context.geometry, shown.rotation(context.camera)
+    normals, own = shown.directions_of_vertices(g.normals), shown.directions_of_triangles(g.triangle_normals)
     kernels.normals_shading(
-        context.visibility.triangle, g.triangles, context.corners, context.rays, g.normals, g.triangle_side, g.triangle_normals,
-        context.camera_from_ray, context.camera.R, out,
+        shown.seen, shown.triangles, shown.corners, context.rays, normals, shown.of_triangles(g.triangle_side), own,
+        context.camera_from_ray, rotation, out,
     )  # fmt: skip
     return out
 
@@ -36,10 +38,9 @@ def _triangle_normals(context: LabelContext) -> NDArray[np.float32]:
     """The triangle's normal (H, W, 3) in camera axes, towards the camera; 0 where nothing is seen."""
     from viewsphere.truth.raster import kernels_channels as kernels
 
-    out, seen = context.empty(np.float32, 3), context.visibility.triangle
-    kernels.normals_geometric(
-        seen, context.geometry.triangle_normals, context.rays, context.camera_from_ray, context.camera.R, out
-    )
+    out, shown = context.empty(np.float32, 3), context.shown
+    own, rotation = shown.directions_of_triangles(context.geometry.triangle_normals), shown.rotation(context.camera)
+    kernels.normals_geometric(shown.seen, own, context.rays, context.camera_from_ray, rotation, out)
     return out
 
 

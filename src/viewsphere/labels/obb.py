@@ -118,6 +118,7 @@ LABEL = ObjectLabel(
     meaning="its smallest oriented rectangles",
     axes="image",
     on_request=True,
+    one_pose=True,
     fields=(
         Field("obb", f"{_CORNERS}: around its visible pixels; None without any", float, (4, 2), "px", "", True, True),
         Field(

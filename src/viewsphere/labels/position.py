@@ -9,9 +9,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewsphere.geometry.rotation import inverse, product, transform
-from viewsphere.labels.shared.point_checks import ROUNDING, Float, exact_depth, largest, misplaced
+from viewsphere.labels.shared.point_checks import (
+    ROUNDING,
+    Float,
+    exact_depth,
+    in_camera_axes,
+    in_world_axes,
+    largest,
+    misplaced,
+)
 from viewsphere.labels.shared.spec import Array, ChannelLabel, Drawing, Models, Picture, channel_of, rendered
 from viewsphere.model.sample import Sample
+from viewsphere.model.sensors.rolling import RowPoses
 
 if TYPE_CHECKING:
     from viewsphere.labels.shared.context import LabelContext
@@ -27,10 +36,26 @@ def _compute(context: LabelContext) -> NDArray[np.float32]:
     """
     from viewsphere.truth.raster import kernels_channels as kernels
 
+    if context.camera.rows is not None:
+        return _in_rows(context, context.camera.rows)
     out, world_from_camera = context.empty(np.float32, 3), inverse(context.camera.R)
     center = -transform(world_from_camera, context.camera.t)
     world_from_ray = product(world_from_camera, context.camera_from_ray_to)
     kernels.positions(context.visibility.inverse_depth, context.rays_to, world_from_ray, center, out)
+    return out
+
+
+def _in_rows(context: LabelContext, rows: RowPoses) -> NDArray[np.float32]:
+    """The points of a rolling shutter: each is at its place at the moment of its row."""
+    from viewsphere.truth.raster import kernels_channels as kernels
+
+    out, inverse_depth, down = context.empty(np.float32, 3), context.visibility.inverse_depth, np.eye(3)
+    for row, (rotation, translation) in enumerate(zip(rows.rotation, rows.translation, strict=True)):
+        down[1, 2] = row  # the row's rays are those of a picture of one row
+        world_from_camera = inverse(rotation)
+        world_from_ray = product(product(world_from_camera, context.camera_from_ray), down)
+        own, center = slice(row, row + 1), -transform(world_from_camera, translation)
+        kernels.positions(inverse_depth[own], context.rays, world_from_ray, center, out[own])
     return out
 
 
@@ -50,7 +75,7 @@ def _prove(sample: Sample, models: Models) -> Iterator[str]:
     if sample.known_camera is None:
         return
     world = points[seen].astype(np.float64)
-    off = misplaced(sample, transform(sample.camera.R, world) + sample.camera.t, seen, _slack(sample, world))
+    off = misplaced(sample, in_camera_axes(sample, world, seen), seen, _slack(sample, world))
     if off.any():
         yield f"expected points that are seen in their pixels, and at their depth; found {off.sum()} others"
     yield from _against_coordinates(sample, points, seen)
@@ -63,7 +88,7 @@ def _against_coordinates(sample: Sample, points: Array, seen: NDArray[np.bool_])
     for o in rendered(sample):
         own = np.logical_and(instances == o.id, seen)
         world = points[own].astype(np.float64)
-        moved = transform(o.world_from_object, coordinates[own].astype(np.float64))
+        moved = in_world_axes(sample, o, coordinates[own].astype(np.float64), own)
         wrong = ~(largest(moved - world) <= _slack(sample, world) + ROUNDING * largest(moved))
         if wrong.any():
             yield f"object {o.id}: expected its coordinates, moved by its pose; found other points at {wrong.sum()} pixels"

@@ -163,6 +163,7 @@ LABEL = ChannelLabel(
     "whether it is seen",
     axes="object, world, image",
     needs=(ObjectPoints(),),
+    one_pose=True,
     options=_SurfaceSamples,
     dtype=SURFACE_SAMPLE,
     components=0,

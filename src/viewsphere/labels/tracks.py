@@ -116,6 +116,7 @@ LABEL = ChannelLabel(
     meaning="points followed through the sequence, a row each: where each was picked, where it is now, whether it is seen",
     axes="world, image",
     needs=(FollowedPoints(),),
+    one_pose=True,
     dtype=TRACK,
     components=0,
     unit="m, px",

@@ -30,7 +30,7 @@ def _compute(context: LabelContext, i: int) -> Mapping[str, Any]:
 
 
 def _shares(context: LabelContext, i: int, area: int) -> tuple[float, float]:
-    own, whole = context.projected[i]
+    own, whole = context.reached[i]
     if own is None:
         if not area:
             return 0.0, 1.0

@@ -273,6 +273,7 @@ def _inside(grid: Grid, points: Float) -> tuple[Rows, ...]:
 
 LABEL = ChannelLabel(
     name="voxels",
+    one_pose=True,
     meaning="cells of a grid before the camera, in runs, a row each: how many, class as in `semantic` (0: empty), object, "
     "surface or inside, seen or not, indoors or not; `sample.voxel_grid` has them as arrays",
     axes="ahead, up, right",

@@ -4,20 +4,23 @@ from __future__ import annotations
 
 from bisect import bisect_left
 from collections.abc import Iterator
-from itertools import product
+from functools import lru_cache
+from itertools import product as pairs_of
+from typing import Any
 
 import numpy as np
 from pydantic import Field, JsonValue, model_validator
 
-from viewsphere.geometry.rotation import compose, transform
+from viewsphere.geometry.rotation import compose, product, transform
 from viewsphere.model.annotations.tracks import Tracks
 from viewsphere.model.fields.files import Files
 from viewsphere.model.fields.frozen import Frozen
 from viewsphere.model.instant import Instant, Viewpoint, viewpoint_of
-from viewsphere.model.scene import IDENTITY, Finish, Scene
+from viewsphere.model.scene import IDENTITY, Finish, Matrix4, Scene
 from viewsphere.model.sensors.camera import Camera, Intrinsics
 from viewsphere.model.sensors.exposure import Exposure, Sweep
-from viewsphere.model.sensors.rig import Rig
+from viewsphere.model.sensors.rig import Rig, Sensor
+from viewsphere.model.sensors.rolling import RowPoses
 from viewsphere.model.thing import Motion, Thing
 
 
@@ -28,8 +31,8 @@ class Shot(Frozen):
     number of the first sample in the data set. Instants ascend by their indices.
 
     `shutter` is the time for which the shutter is open, centred on the instant, as a share of the time between two instants. If
-    it is not 0, pictures show everything during this time, and `exposures`, one an instant, hold the motions. Labels always
-    show the instant itself.
+    it is not 0, pictures show everything during this time. Labels show the instant itself, or the moment of their row for a
+    sensor with a rolling shutter. `exposures`, one an instant, hold the motions for both.
     """
 
     key: str  # stable, unique, fit for a folder's name
@@ -76,10 +79,11 @@ class Shot(Frozen):
 
     @model_validator(mode="after")
     def _exposed_at_all_instants(self) -> Shot:
-        if len(self.exposures) != (len(self.instants) if self.shutter else 0):
+        allowed = {len(self.instants) if self.shutter else 0} | ({len(self.instants)} if self.rig.rolls else set[int]())
+        if len(self.exposures) not in allowed:
             expected = "an exposure an instant" if self.shutter else "none without a shutter"
             raise ValueError(f"exposures: expected {expected} ({len(self.instants)}); found {len(self.exposures)}")
-        if any(exposure and len(exposure.things) != len(self.things) for exposure in self.exposures):
+        if any(exposure and len(exposure.things) < len(self.things) for exposure in self.exposures):
             raise ValueError(f"exposures: expected a sweep or None for each of {len(self.things)} things")
         return self
 
@@ -105,7 +109,7 @@ class Shot(Frozen):
     def samples(self) -> Iterator[tuple[int, int, int]]:
         """Number in the data set, instant and sensor (both counted from 0 here) of every sample, in order."""
         recorded = (number for number, instant in enumerate(self.instants) if instant.recorded)
-        for place, (instant, sensor) in enumerate(product(recorded, range(len(self.rig.sensors)))):
+        for place, (instant, sensor) in enumerate(pairs_of(recorded, range(len(self.rig.sensors)))):
             yield self.first + place, instant, sensor
 
     def instant_after(self, instant: int, offset: int) -> int | None:
@@ -129,12 +133,21 @@ class Shot(Frozen):
 
     def camera(self, instant: int, sensor: int = 0) -> Camera:
         """The camera of a sensor at an instant, both counted from 0 in the shot."""
-        pose, mounted = self.instants[instant].world_from_rig, self.rig.sensors[sensor]
-        world_from_sensor = np.array(pose, np.float64)
+        return self._camera(self.instants[instant].world_from_rig, 0.0, instant, sensor)
+
+    def _camera(self, world_from_rig: Matrix4, moment: float, instant: int, sensor: int) -> Camera:
+        """The camera of a sensor on the rig at a pose, whose middle row is exposed at a moment after an instant."""
+        mounted, lens = self.rig.sensors[sensor], self._lens(instant, sensor)
+        world_from_sensor = np.array(world_from_rig, np.float64)
         if mounted.rig_from_sensor != IDENTITY:
             world_from_sensor = compose(world_from_sensor, np.array(mounted.rig_from_sensor))
         rotation = np.ascontiguousarray(world_from_sensor[:3, :3].T)
-        return Camera(self._lens(instant, sensor), rotation, -transform(rotation, world_from_sensor[:3, 3]))
+        exposure = self.exposures[instant] if lens.rolling is not None and self.exposures else None
+        rows = None
+        if exposure is not None:
+            held: Any = exposure, self.instants[instant].world_from_rig, mounted, lens  # frozen, so they have hashes
+            rows = _rows(*held, moment)
+        return Camera(lens, rotation, -transform(rotation, world_from_sensor[:3, 3]), rows)
 
     def viewpoint(self, instant: int, sensor: int = 0) -> Viewpoint | None:
         """The viewpoint of a sensor at an instant, both counted from 0. The rig's first sensor has the instant's requested
@@ -168,9 +181,8 @@ class Shot(Frozen):
     def camera_during(self, instant: int, moment: float, sensor: int = 0) -> Camera:
         """The camera of a sensor at a moment after an instant, while the shutter is open."""
         exposure, now = self.exposures[instant], self.instants[instant]
-        pose = exposure.rig.pose(moment) if exposure and exposure.rig else now.world_from_rig
-        then = now.model_copy(update={"world_from_rig": pose})
-        return self.model_copy(update={"instants": (then,)}).camera(0, sensor)
+        pose = exposure.rig.pose(moment) if exposure and exposure.rig else None
+        return self._camera(pose or now.world_from_rig, moment, instant, sensor)
 
     def finish(self, instant: int, sensor: int = 0) -> Finish:
         """The finish that turns the light of a sensor into a picture at an instant, both counted from 0 in the shot.
@@ -190,6 +202,20 @@ class Shot(Frozen):
         )
         alike = {"key": "", "first": 0, "sequence": "", "tracks": None, "instants": (), "things": things, "exposures": ()}
         return self.model_copy(update=alike | {"optional": {}}).model_dump_json()
+
+
+@lru_cache(maxsize=4)  # labels, pictures and proofs of a frame share them
+def _rows(exposure: Exposure, world_from_rig: Matrix4, mounted: Sensor, lens: Intrinsics, moment: float) -> RowPoses:
+    """The poses of a sensor's rows; the row in the middle is exposed at a moment after the instant of the exposure."""
+    assert lens.rolling is not None and exposure.interval is not None
+    height, moments = lens.height, lens.rolling.moments(lens.height, exposure.interval) + moment
+    rig = np.tile(np.array(world_from_rig), (height, 1, 1)) if exposure.rig is None else exposure.rig.poses(moments)
+    placed = rig
+    if mounted.rig_from_sensor != IDENTITY:
+        placed = np.stack([compose(pose, np.array(mounted.rig_from_sensor)) for pose in rig])
+    rotation = np.ascontiguousarray(placed[:, :3, :3].swapaxes(1, 2))
+    moving = {i: sweep.poses(moments) for i, sweep in enumerate(exposure.things) if sweep is not None}
+    return RowPoses(rotation, -product(rotation, placed[:, :3, 3:])[..., 0], moving)
 
 
 def _held(sweep: Sweep, moment: float) -> Motion:

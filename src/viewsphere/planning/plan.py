@@ -34,7 +34,7 @@ from viewsphere.model.scene import IDENTITY, Floor
 from viewsphere.model.sensors.rig import Rig
 from viewsphere.model.shot import Shot
 from viewsphere.model.thing import Motion, Thing
-from viewsphere.planning.checks.lenses import check_fill, check_lenses
+from viewsphere.planning.checks.lenses import check_fill, check_lenses, check_rigid
 from viewsphere.planning.checks.models import (
     check_all_frames,
     check_distractors,
@@ -451,6 +451,7 @@ def plan(recipe: Recipe | str | PathLike[str], shot_frames: int | None = None) -
         lines: tuple[Timeline | None, ...] = (None,) * len(specs)
         if recipe.time is not None:
             specs, lines = with_clips(recipe, numbered)
+            check_rigid(recipe, specs, lines)
         check_specs(recipe, specs)
         most = recipe.shot_frames or shot_frames or SHOT_FRAMES
         frames = 1 if recipe.is_new_each_frame and recipe.time is None else most

@@ -18,6 +18,7 @@ from viewsphere.model.scene import IDENTITY, Matrix4
 from viewsphere.model.sensors.camera import Intrinsics
 from viewsphere.model.sensors.lidar import LIDAR, Lidar
 from viewsphere.model.sensors.rig import Rig, Sensor
+from viewsphere.model.sensors.rolling import Rolling
 from viewsphere.planning.checks.lenses import check_lenses
 from viewsphere.planning.rig_files import Calibrated, read_rig
 from viewsphere.recipe.cameras.rig import RigFile, SensorEntry, SensorList, StereoRig, SurroundRig
@@ -48,6 +49,7 @@ def rig_of(recipe: Recipe, lens: Intrinsics) -> Rig | None:
             rig = _listed(recipe, recipe.rig, lens)
         case RigFile():
             rig = _calibrated(recipe, recipe.rig, lens)
+    rig = _with_shutter(rig, recipe.camera.rolling)
     recipe = with_distances(recipe, rig)
     rig = _by_lens(recipe, rig)
     check_lenses(recipe, rig)
@@ -89,6 +91,20 @@ def _refused(name: str, sensor: Sensor) -> bool:
     """Return whether a sensor's lens rules out a channel."""
     label = label_named(name)
     return label is not None and label.refuses is not None and label.refuses(sensor.intrinsics) is not None
+
+
+def _with_shutter(rig: Rig, rolling: Rolling | None) -> Rig:
+    """The rig whose cameras have this rolling shutter, as the recipe's camera."""
+    if rolling is None:
+        return rig
+    return Rig(
+        sensors=tuple(
+            sensor
+            if sensor.lidar is not None
+            else sensor.model_copy(update={"intrinsics": sensor.intrinsics.model_copy(update={"rolling": rolling})})
+            for sensor in rig.sensors
+        )
+    )
 
 
 def _mounted(sensors: Mapping[str, tuple[Intrinsics, Float]]) -> Rig:

@@ -36,6 +36,9 @@ class EngineSpec(Spec):
     parallel_rays: bool = Field(
         default=False, description="whether it paints lenses whose rays are parallel instead of passing through one centre"
     )
+    rolling: bool = Field(
+        default=False, description="whether it paints pictures of rolling shutters, whose rows have their own poses"
+    )
     programs: tuple[Path, ...] = Field(
         default=(), description="files and folders besides its module whose sources decide what its pictures look like"
     )

@@ -55,6 +55,10 @@ class FormatSpec(SpecWithOptions):
         default=False,
         description="whether it holds pictures whose rays are parallel: it stores no cameras, or also the kind of lens",
     )
+    rolling: bool = Field(
+        default=False,
+        description="whether it holds pictures of rolling shutters: it stores no poses of cameras, or also the readout",
+    )
     refuses: Annotated[Callable[..., Iterator[str]] | None, Takes(1)] = Field(
         default=None,
         description="the parts of a `viewsphere.formats.Scope` that the format cannot hold, as `expected ...; found ...`",

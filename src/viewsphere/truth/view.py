@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property, lru_cache
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
@@ -14,6 +14,7 @@ from viewsphere.geometry.rotation import inverse, transform
 from viewsphere.model.sensors.camera import Camera
 from viewsphere.model.thing import Thing
 from viewsphere.truth.raster.geometry import Geometry, seen_from
+from viewsphere.truth.raster.rolling import owners_of
 from viewsphere.truth.raster.visibility import Visibility, direction_matrix, homogeneous, lens_rays_to, pixels_of, rasterize
 
 Float = NDArray[np.float64]
@@ -161,7 +162,7 @@ class View:
     @property
     def owners(self) -> NDArray[np.int32]:
         """The thing of each triangle, by its position in `things`; for the ground, the number of things."""
-        return _owners(self.geometry.triangle_start, len(self.geometry.triangles))
+        return owners_of(self.geometry)
 
     def body(self, i: int) -> Body:
         """Thing i."""
@@ -212,9 +213,3 @@ class View:
     def has_sky_of(self, other: View) -> bool:
         """Return whether each pixel without a triangle shows a direction of its own in both views."""
         return self.shows_directions and other.shows_directions
-
-
-@lru_cache(maxsize=4)
-def _owners(triangle_start: tuple[int, ...], triangles: int) -> NDArray[np.int32]:
-    counts = np.diff([*triangle_start, triangles])
-    return np.repeat(np.arange(len(counts), dtype=np.int32), counts)

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Container, Iterator
-from dataclasses import dataclass
+from collections.abc import Container, Iterator, Sequence
+from dataclasses import dataclass, replace
 from importlib.util import find_spec
 from io import BytesIO
 from pathlib import Path
@@ -19,6 +19,7 @@ from viewsphere.geometry.camera import pixel_rays
 from viewsphere.geometry.rotation import transform
 from viewsphere.model.sample import Sample
 from viewsphere.model.sensors.camera import Camera
+from viewsphere.model.sensors.rolling import RowPoses
 from viewsphere.model.thing import Thing
 from viewsphere.run.shots.composing import SceneryRecord
 from viewsphere.run.shots.scenery import Scenery
@@ -56,11 +57,59 @@ class _Soup:
 
 
 @dataclass(frozen=True, eq=False)
+class _Placed:
+    """One thing: its object's id, 0 for scenery; its position in the shot; its pose (4, 4), world from thing; its triangles."""
+
+    id: int
+    position: int
+    world: Float
+    soup: _Soup
+
+
+@dataclass(frozen=True, eq=False)
 class _Target:
     """A scene of Embree, and normals (T, 3) of its single-sided triangles, 0 for the others."""
 
     scene: Any
     fronts: Float
+
+
+@dataclass(frozen=True, eq=False)
+class _Part:
+    """Triangles that move together, as two scenes: of those that hide others, and of the others; and their objects' ids.
+
+    A surface is in one of both, as a scene of all, beside that of what hides others, would take twice as long to make.
+    `position` is that of a thing that moves while the rows of a rolling shutter are exposed, None for all others together.
+    """
+
+    position: int | None
+    now: Float
+    solid: _Target | None
+    clear: _Target | None
+    owners: tuple[NDArray[np.int64], NDArray[np.int64]]
+
+
+@dataclass(frozen=True, eq=False)
+class _Rays:
+    """Rays (n,) in the world, relative to the middle: where they begin, their directions, and the rows of their pixels."""
+
+    origins: Float
+    directions: Float
+    row: NDArray[np.intp]
+    rows: RowPoses | None
+
+    def further(self, away: Float) -> _Rays:
+        """The rays, which begin later."""
+        return replace(self, origins=self.origins + away[:, None] * self.directions)
+
+    def at_rest(self, part: _Part, middle: Float) -> tuple[Float, Float]:
+        """Origins and directions as the part sees them, which stands where it is at the instant."""
+        if self.rows is None or part.position is None:
+            return self.origins, self.directions
+        poses = self.rows.moving[part.position][self.row]
+        turned = part.now[:3, :3] @ poses[:, :3, :3].swapaxes(1, 2)
+        begin = self.origins + middle - poses[:, :3, 3]
+        return (turned @ begin[..., None])[..., 0] + part.now[:3, 3] - middle, (turned @ self.directions[..., None])[..., 0]
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,9 +146,7 @@ class RayCaster:
         self._known: dict[str, _Soup] = {}
         self._around: dict[str, _Soup | None] = {}
         self._key: object = None
-        self._solid: Any = None
-        self._clear: Any = None
-        self._owners = np.zeros(0, np.int64), np.zeros(0, np.int64)
+        self._parts: tuple[_Part, ...] = ()
         self._middle = np.zeros(3)
         self._lowest = 0.0
         self._has_ground = False
@@ -137,14 +184,15 @@ class RayCaster:
         chosen = np.linspace(0, len(rows) - 1, min(PIXELS, len(rows))).astype(int)
         rows, columns = rows[chosen], columns[chosen]
         ids, scale = sample.channels["instances"][rows, columns], depth.scale[rows, columns]
-        directions = depth.rays[rows, columns] @ sample.camera.R
+        directions = _turned(sample.camera, depth.rays[rows, columns], rows)
         s = depth.stored[rows, columns] / scale
         slack = TOLERANCE * np.abs(np.where(np.isfinite(s), s, 0.0)) + depth.rounded / np.abs(scale)
         eye = self._eyes(sample)[rows, columns]
         start = np.where(np.isfinite(s), s - slack, 0.0)
-        found, owner = self._nearest(eye + start[:, None] * directions, directions)
+        rays = _Rays(eye, directions, rows, sample.camera.rows)
+        found, owner = self._nearest(rays.further(start))
         found = found + start
-        first, _ = _cast(self._solid, eye, directions)
+        first = np.min([_cast(part.solid, *rays.at_rest(part, self._middle))[0] for part in self._parts], axis=0)
         with np.errstate(invalid="ignore"):
             there = (np.abs(found - s) <= slack) & (owner == ids)
             height = (eye + s[:, None] * directions)[:, 2]
@@ -164,15 +212,23 @@ class RayCaster:
     def _eyes(self, sample: Sample) -> Float:
         """Places (H, W, 3) where the rays of pixels begin, relative to the middle."""
         camera = sample.camera
+        if camera.rows is not None:
+            centers = -np.einsum("hji,hj->hi", camera.rows.rotation, camera.rows.translation)
+            return np.broadcast_to((centers - self._middle)[:, None], (camera.height, camera.width, 3))
         if not camera.lens.is_parallel:
             return np.broadcast_to(camera.center - self._middle, (camera.height, camera.width, 3))
         return camera.center - self._middle + transform(camera.R.T, camera.lens.origins())
 
-    def _nearest(self, origins: Float, directions: Float) -> tuple[Float, NDArray[np.int64]]:
+    def _nearest(self, rays: _Rays) -> tuple[Float, NDArray[np.int64]]:
         """Distance along each ray (infinite if nothing is hit) and the id of the hit object, 0 for scenery, -1 for none."""
-        (solid, i), (clear, k) = _cast(self._solid, origins, directions), _cast(self._clear, origins, directions)
-        of_solid, of_clear = (np.append(own, -1)[which] for own, which in zip(self._owners, (i, k), strict=True))
-        return np.minimum(solid, clear), np.where(clear < solid, of_clear, of_solid)
+        nearest, owner = np.full(len(rays.row), np.inf), np.full(len(rays.row), -1, np.int64)
+        for part in self._parts:
+            seen = rays.at_rest(part, self._middle)
+            for target, owners in zip((part.solid, part.clear), part.owners, strict=True):
+                distance, triangle = _cast(target, *seen)
+                is_nearer = distance < nearest
+                nearest[is_nearer], owner[is_nearer] = distance[is_nearer], np.append(owners, -1)[triangle[is_nearer]]
+        return nearest, owner
 
     def _is_in_ground(self, camera: Camera) -> bool:
         """Return whether the camera is in the plane of the ground, or its parallel rays are along it: it sees no ground."""
@@ -196,26 +252,37 @@ class RayCaster:
         ground = None if shot is None else shot.scene.ground
         self._has_ground = ground is not None and ground.is_labelled
         instant = 0 if shot is None else self._scenery.position(sample, shot)[0]
-        behind = [thing for thing in (piece.still_at(instant) for piece in scenery.things) if thing.is_there]
-        key = [(o.key, o.world_from_object.tobytes()) for o in sample.objects], behind, scenery, floor
+        pieces = enumerate((piece.still_at(instant) for piece in scenery.things), 0 if shot is None else len(shot.objects))
+        behind = [(i, thing) for i, thing in pieces if thing.is_there]
+        rows = sample.camera.rows
+        moving = frozenset[int]() if rows is None else frozenset(rows.moving)
+        key = [(o.key, o.world_from_object.tobytes()) for o in sample.objects], behind, scenery, floor, moving
         if key == self._key:
             return
         self._middle = np.mean([o.box3d.mean(axis=0) for o in sample.objects] or [np.zeros(3)], axis=0)
-        placed = [(o.id, o.world_from_object, self._exported(o.key)) for o in sample.objects]
-        remade = [(p.world_from_object, self._remade(scenery, p)) for p in behind]
-        self._complete = all(soup is not None for _, soup in remade)
-        placed += [(0, np.array(world), soup) for world, soup in remade if soup is not None]
-        nothing = np.zeros((0, 3, 3))
-        corners = np.concatenate([nothing, *(transform(world, soup.corners) - self._middle for _, world, soup in placed)])
-        opaque = np.concatenate([np.zeros(0, np.bool_), *(soup.opaque for _, _, soup in placed)])
-        single = np.concatenate([np.zeros(0, np.bool_), *(soup.single for _, _, soup in placed)])
-        owner = np.repeat([i for i, _, _ in placed], [len(soup.corners) for _, _, soup in placed])
-        lowest = float(corners[..., 2].min(initial=np.inf))
+        placed = [_Placed(o.id, o.id - 1, o.world_from_object, self._exported(o.key)) for o in sample.objects]
+        remade = [(i, p.world_from_object, self._remade(scenery, p)) for i, p in behind]
+        self._complete = all(soup is not None for _, _, soup in remade)
+        placed += [_Placed(0, i, np.array(world), soup) for i, world, soup in remade if soup is not None]
+        still = [one for one in placed if one.position not in moving]
+        alone = (([one], one.position) for one in placed if one.position in moving)
+        made = [self._part(group, position) for group, position in ((still, None), *alone)]
+        self._parts = tuple(part for part, _ in made)
+        lowest = min(height for _, height in made)
         self._lowest = lowest if floor is None else floor.under(lowest + self._middle[2]) - self._middle[2]
-        # A surface is in one of two scenes: one of all, beside that of what hides others, would take twice as long to make.
-        self._solid, self._clear = _target(corners, single, opaque), _target(corners, single, ~opaque)
-        self._owners = owner[opaque], owner[~opaque]
         self._key = key
+
+    def _part(self, placed: Sequence[_Placed], position: int | None) -> tuple[_Part, float]:
+        """Things that move together, and the height of their lowest point."""
+        nothing = np.zeros((0, 3, 3))
+        corners = np.concatenate([nothing, *(transform(one.world, one.soup.corners) - self._middle for one in placed)])
+        opaque = np.concatenate([np.zeros(0, np.bool_), *(one.soup.opaque for one in placed)])
+        single = np.concatenate([np.zeros(0, np.bool_), *(one.soup.single for one in placed)])
+        counts = [len(one.soup.corners) for one in placed]
+        owner = np.repeat(np.array([one.id for one in placed], np.int64), counts)
+        now = np.eye(4) if position is None else placed[0].world
+        targets = _target(corners, single, opaque), _target(corners, single, ~opaque)
+        return _Part(position, now, *targets, (owner[opaque], owner[~opaque])), float(corners[..., 2].min(initial=np.inf))
 
     def _exported(self, key: str) -> _Soup:
         soup = self._known.get(key) or _read(*self._files[key])
@@ -229,6 +296,13 @@ class RayCaster:
             mesh = self._scenery.mesh(record, thing)
             self._around[digest] = mesh and _soup_of(mesh)
         return self._around[digest]
+
+
+def _turned(camera: Camera, rays: Float, rows: NDArray[np.intp]) -> Float:
+    """Directions (n, 3) in the world of rays in the camera's axes, through pixels in these rows."""
+    if camera.rows is None:
+        return rays @ camera.R
+    return (rays[:, None] @ camera.rows.rotation[rows])[:, 0]
 
 
 def _soup_of(mesh: Mesh) -> _Soup:

@@ -35,4 +35,4 @@ def stage(shot: Shot, load: Load) -> RasterStage:
     return build_stage(shot, load)
 
 
-ENGINE = EngineSpec(check=_check, stage=stage, paints=tuple(PASSES), parallel_rays=True)
+ENGINE = EngineSpec(check=_check, stage=stage, paints=tuple(PASSES), parallel_rays=True, rolling=True)

@@ -54,7 +54,7 @@ class PictureRays(NamedTuple):
     eye (3,); rotation (3, 3) world to camera; lens (2, 3): ray = lens @ (column, row, 1) in samples; rays (S, 3), empty for a
     pinhole; columns: samples in a row; pixel: a pixel's size at distance 1; scale: factor of depths; places (S, 2): column and
     row of samples that are not on a grid, otherwise empty. shifts (S, 3): from the eye to where each ray begins, for parallel
-    rays, whose pixels have one size at any distance; otherwise empty.
+    rays and rolling shutters; otherwise empty. is_parallel: whether pixels have one size at any distance.
     """
 
     eye: Float32
@@ -66,11 +66,12 @@ class PictureRays(NamedTuple):
     scale: np.float32
     places: Float32 = np.zeros((0, 2), np.float32)
     shifts: Float32 = np.zeros((0, 3), np.float32)
+    is_parallel: bool = False
 
     @property
     def spread(self) -> float:
         """The growth of a pixel's size with distance."""
-        return 0.0 if len(self.shifts) else float(self.pixel)
+        return 0.0 if self.is_parallel else float(self.pixel)
 
 
 class Lightmap(NamedTuple):

@@ -78,6 +78,7 @@ def _read(path: Path, *, keep_going: bool = False) -> ForeignDataset:
 
 FORMAT = FormatSpec(
     parallel_rays=True,
+    rolling=True,
     about=__doc__,
     holds=("boxes", "masks", "keypoints", "captions", "poses", "3D boxes"),
     read_by=("pycocotools", "torchvision", "datumaro", "supervision", "FiftyOne"),

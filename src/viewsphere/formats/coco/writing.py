@@ -290,6 +290,7 @@ def _image(dataset: Dataset, sample: Sample) -> dict[str, Any]:
         "tilt": pose.tilt_deg,
         "transformation_matrix": transformation_matrix(camera) | _projection(camera),
         "distortion": camera.lens.record,
+        **camera.shutter_record,
     }
 
 

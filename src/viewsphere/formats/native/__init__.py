@@ -68,6 +68,7 @@ def _read(path: Path, *, keep_going: bool = False) -> ForeignDataset:
 
 FORMAT = FormatSpec(
     parallel_rays=True,
+    rolling=True,
     about=__doc__,
     holds=("poses", "3D boxes", "masks", "depth"),
     read_by=("any JSON reader",),

@@ -26,6 +26,7 @@ from viewsphere.model.credit import Credit
 from viewsphere.model.instant import Viewpoint
 from viewsphere.model.sample import ObjectAnnotation, Sample
 from viewsphere.model.sensors.camera import Camera, Intrinsics
+from viewsphere.model.sensors.rolling import Rolling
 from viewsphere.model.thing import TimeStep
 from viewsphere.store import Category, ModelInfo, decode
 from viewsphere.store.foreign import ForeignDataset, ForeignFrame, ForeignModel, foreign_object, refuse_broken
@@ -198,7 +199,7 @@ def _frame(
     first = entries[0][1]
     folder = PurePosixPath(pose.get("folder", f"Pose-{number}"))
     matrix = first.get("transformation_matrix") or pose["transformation_matrix"]
-    camera = _camera(matrix, first["render_resolution"], first.get("distortion"))
+    camera = _camera(matrix, first["render_resolution"], first.get("distortion"), first.get("rolling_shutter"))
     view: Mapping[str, Any] = first.get("viewpoint") or pose  # the paper's own files have one for each pose
     split = str(first.get("split") or "train")
     if not _is_name(split) or not 0 <= int(number) < LARGEST_POSE:
@@ -247,7 +248,12 @@ def _is_depth(file: Path, camera: Camera) -> bool:
     return array.shape == (camera.height, camera.width)
 
 
-def _camera(matrix: Mapping[str, Any], resolution: list[int], distortion: dict[str, Any] | None) -> Camera:
+def _camera(
+    matrix: Mapping[str, Any],
+    resolution: list[int],
+    distortion: dict[str, Any] | None,
+    shutter: dict[str, Any] | None,
+) -> Camera:
     k, motion = np.array(matrix["K"], np.float64), np.array(matrix["RT"], np.float64)
     if k.shape != (3, 3) or motion.shape != (3, 4) or not (np.isfinite(k).all() and np.isfinite(motion).all()):
         raise ValueError("found no K (3, 3) and RT (3, 4) of numbers")
@@ -256,7 +262,8 @@ def _camera(matrix: Mapping[str, Any], resolution: list[int], distortion: dict[s
         raise ValueError("found an RT without a rotation")
     width, height = resolution
     size, bent = {"width": width, "height": height}, read_parameters(distortion or None)
-    lens = Intrinsics(**size, fx=k[0, 0], fy=k[1, 1], cx=k[0, 2], cy=k[1, 2], skew=k[0, 1], distortion=bent)
+    rolling = None if shutter is None else Rolling.model_validate(shutter)
+    lens = Intrinsics(**size, fx=k[0, 0], fy=k[1, 1], cx=k[0, 2], cy=k[1, 2], skew=k[0, 1], distortion=bent, rolling=rolling)
     return Camera(lens, rotation, motion[:, 3])
 
 

@@ -236,4 +236,5 @@ def _rendered(sample: Sample, o: ObjectAnnotation, mask: str, files: Mapping[str
         "split": sample.split,
         "transformation_matrix": transformation_matrix(sample.camera),
         **({"distortion": bent} if bent else {}),
+        **sample.camera.shutter_record,
     }

@@ -61,6 +61,7 @@ preparer, writer, verify = functions(Voc)
 
 FORMAT = FormatSpec(
     parallel_rays=True,
+    rolling=True,
     about=__doc__,
     holds=("boxes", "class masks", "instance masks", "truncation", "occlusion", "pose categories"),
     read_by=("torchvision", "supervision", "datumaro"),

@@ -37,6 +37,7 @@ preparer, writer, verify = functions(Yolo)
 
 FORMAT = FormatSpec(
     parallel_rays=True,
+    rolling=True,
     about=__doc__,
     holds=("boxes", "masks", "keypoints", "oriented boxes"),
     read_by=("ultralytics", "supervision", "datumaro"),

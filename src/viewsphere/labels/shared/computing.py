@@ -88,8 +88,8 @@ def context_of(
         )
     ]
     places = tuple(
-        None if pose is None else Placement(thing.model, pose, camera, shot.category_deg, lambda known=known: known, step)
-        for thing, known in zip(objects, facts, strict=True)
+        None if pose is None else Placement(thing.model, pose, camera, shot.category_deg, lambda known=known: known, step, i)
+        for i, (thing, known) in enumerate(zip(objects, facts, strict=True))
         for pose, step in ((thing.motion.pose_at(instant), thing.motion.step_at(instant)),)
     )
     return LabelContext(geometry, camera, visibility, places, neighbours, shot.annotations, shot.labels)

@@ -10,15 +10,19 @@ from typing import Any, Generic, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from viewsphere.errors import PluginError
+from viewsphere.errors import PluginError, UserError
 from viewsphere.geometry.box import Bounds, is_behind, projected_bounds
+from viewsphere.geometry.lenses import NEAR
+from viewsphere.geometry.rotation import product
 from viewsphere.geometry.seam import turns
 from viewsphere.labels.shared.needs import Need, OwnView, Partner
 from viewsphere.labels.shared.placement import Placement
 from viewsphere.model.fields.frozen import Frozen
 from viewsphere.model.sensors.camera import Camera
+from viewsphere.model.sensors.rolling import RowPoses
 from viewsphere.truth.correspondences.correspondence import Match
 from viewsphere.truth.raster.geometry import Geometry
+from viewsphere.truth.raster.rolling import RowRuns, centers_of, pixels_in_rows, reach_in_rows, row_runs
 from viewsphere.truth.raster.visibility import (
     Instances,
     Visibility,
@@ -37,6 +41,14 @@ Made = TypeVar("Made")
 
 NOWHERE = (math.nan,) * 4
 EVERYWHERE = (-math.inf, -math.inf, math.inf, math.inf)
+
+
+def _corners(geometry: Geometry, i: int) -> NDArray[np.float64]:
+    """The corners (8, 3) of the box around thing i along its own axes, metres."""
+    own = slice(geometry.vertex_start[i], geometry.vertex_start[i + 1])
+    used = geometry.coordinates[own][geometry.is_used[own]]
+    low, high = (used.min(axis=0), used.max(axis=0)) if len(used) else np.zeros((2, 3), np.float32)
+    return np.where(np.indices((2, 2, 2)).reshape(3, 8).T, high, low).astype(np.float64)
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,6 +85,45 @@ class _Shared(Generic[Made]):
 
     def __get__(self, context: LabelContext, owner: type[LabelContext]) -> Made:
         return context.once(f"context.{self._method.__name__}", lambda: self._method(context))
+
+
+@dataclass(frozen=True, eq=False)
+class ShownTriangles:
+    """The triangles that pixels show, as `kernels_channels` takes them: seen (H, W), triangles (n, 3), objects (n,), and the
+    `homogeneous` corners that the triangles number. Under a rolling shutter each row has triangles of its own.
+    """
+
+    seen: NDArray[np.int32]
+    triangles: NDArray[np.int32]
+    objects: NDArray[np.int32]
+    corners: NDArray[np.float64]
+    runs: RowRuns | None = None
+    known: NDArray[np.int32] | None = None
+
+    def of_vertices(self, values: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Values of the geometry's vertices, for these corners."""
+        return values if self.known is None else values[self.known]
+
+    def of_triangles(self, values: NDArray[Any]) -> NDArray[Any]:
+        """Values of the geometry's triangles, for these triangles."""
+        return values if self.runs is None else values[self.runs.triangle]
+
+    def directions_of_vertices(self, normals: NDArray[np.float32]) -> NDArray[np.float32]:
+        """World directions of the geometry's vertices, for these corners, in the axes from which `rotation` leads."""
+        return normals if self.runs is None else _turned(np.repeat(self.runs.turns, 3, axis=0), self.of_vertices(normals))
+
+    def directions_of_triangles(self, normals: NDArray[np.float32]) -> NDArray[np.float32]:
+        """World directions of the geometry's triangles, for these triangles, in the axes from which `rotation` leads."""
+        return normals if self.runs is None else _turned(self.runs.turns, self.of_triangles(normals))
+
+    def rotation(self, camera: Camera) -> NDArray[np.float64]:
+        """The matrix (3, 3) from the axes of the directions to the camera's: those of the world or, in rows, the camera's."""
+        return camera.R if self.runs is None else np.eye(3)
+
+
+def _turned(matrices: NDArray[np.float64], vectors: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Each vector (n, 3) turned by its own matrix (n, 3, 3)."""
+    return product(matrices, vectors[..., None].astype(np.float64))[..., 0].astype(np.float32)
 
 
 @dataclass(frozen=True, eq=False)
@@ -125,11 +176,18 @@ class LabelContext:
         """
         if not self.needs:
             self._check(OwnView())
+        self._check_pose()
         return self.neighbours.view(0, None) if self.neighbours else None
+
+    def _check_pose(self) -> None:
+        """Raise UserError if the rows of the picture have poses of their own, which comparisons of views do not know."""
+        if self.camera.rows is not None:
+            raise UserError(f"label {self.label}: expected a global shutter; found a rolling one: leave the label out")
 
     def match(self, need: Need[View | None]) -> Match | None:
         """Return the places of the picture's points in a neighbouring view. The result is kept, so that labels share it."""
         self._check(need)
+        self._check_pose()
         if need not in self._matches:
             own, other = self.own_view, self.get(need)
             self._matches[need] = Match(own, self.visibility, other) if own and other else None
@@ -172,6 +230,16 @@ class LabelContext:
         return homogeneous(self.geometry, self.camera) if self.visibility.corners is None else self.visibility.corners
 
     @_Shared
+    def shown(self) -> ShownTriangles:
+        """The triangles that the pixels show, with the places of their corners."""
+        g, seen, rows = self.geometry, self.visibility.triangle, self.camera.rows
+        if rows is None:
+            return ShownTriangles(seen, g.triangles, g.triangle_object, self.corners)
+        runs = row_runs(g, self.camera, rows, seen)
+        known = g.triangles[runs.triangle].reshape(-1)
+        return ShownTriangles(runs.seen, runs.triangles, g.triangle_object[runs.triangle], runs.corners, runs, known)
+
+    @_Shared
     def camera_from_ray(self) -> NDArray[np.float64]:
         """Matrix (3, 3) from `rays` to their directions in camera axes, see `truth.raster.visibility.direction_matrix`."""
         return direction_matrix(self.camera)
@@ -191,14 +259,38 @@ class LabelContext:
         """For each object the 2D box of its projected triangles, and whether the lens shows all of them."""
         return tuple(self._projected(i) for i in range(self.geometry.object_count))
 
+    @_Shared
+    def reached(self) -> tuple[tuple[Bounds | None, bool], ...]:
+        """`projected`, but under a rolling shutter the box that holds all pixels which may show the object in any row."""
+        rows, g = self.camera.rows, self.geometry
+        if rows is None:
+            return self.projected
+        boxes = [_corners(g, i) for i in range(g.object_count)]
+        reached = [reach_in_rows(self.camera, rows, i, g.poses[i], box) for i, box in enumerate(boxes)]
+        return tuple((EVERYWHERE if one is None else one, one is not None) for one in reached)
+
     def _projected(self, i: int) -> tuple[Bounds | None, bool]:
         g = self.geometry
+        if self.camera.rows is not None:
+            return self._projected_in_rows(i, self.camera.rows)
         (first, stop), (base, end) = g.triangle_start[i : i + 2], g.vertex_start[i : i + 2]
         if first < stop and self.camera.lens.is_straight and is_behind(self.camera, g.bounds[i]):
             return None, False
         triangles = g.triangles[first:stop]
         own = triangles - np.int32(base) if base else triangles  # saves a large array for an object alone
         return projected_bounds(self.camera, g.places(i), own, g.is_used[base:end])
+
+    def _projected_in_rows(self, i: int, rows: RowPoses) -> tuple[Bounds | None, bool]:
+        g = self.geometry
+        own = slice(g.vertex_start[i], g.vertex_start[i + 1])
+        points = g.coordinates[own][g.is_used[own]].astype(np.float64)
+        pixels, z = pixels_in_rows(self.camera, rows, i, g.poses[i], points)
+        if not len(points) or not (z > NEAR).any():
+            return None, not len(points)
+        if not (z > NEAR).all():
+            return None, False
+        (x0, y0), (x1, y1) = pixels.min(axis=0).tolist(), pixels.max(axis=0).tolist()
+        return (x0, y0, x1, y1), True
 
     def is_unobstructed(self, i: int) -> bool:
         """Return whether nothing can hide any part of the object of id i + 1: its 2D box meets no other object's box, there
@@ -207,7 +299,7 @@ class LabelContext:
         geometry = self.geometry
         if geometry.has_scenery:
             return False  # a street's box meets all others, so testing scenery's boxes would cost more than it saves
-        own = self.projected[i][0]
+        own = self.reached[i][0]
         if own is not None:
             (left, top, right, bottom), (x0, y0, x1, y1) = own, self._reaches.T
             beside = (top < y1) & (y0 < bottom)
@@ -221,6 +313,8 @@ class LabelContext:
             return True
         if self.camera.lens.is_parallel:
             return float(self.camera.R[2, 2]) < 0.0
+        if self.camera.rows is not None:
+            return bool((centers_of(self.camera.rows)[:, 2] > geometry.ground_z).all())
         return float(self.camera.center[2]) > geometry.ground_z
 
     @_Shared
@@ -228,7 +322,7 @@ class LabelContext:
         """For each object the 2D box, (N, 4), beyond which it hides nothing. It is unbounded if the lens does not show all of
         the object, and NaN for an object behind the camera.
         """
-        boxes = (NOWHERE if box is None else box if whole else EVERYWHERE for box, whole in self.projected)
+        boxes = (NOWHERE if box is None else box if whole else EVERYWHERE for box, whole in self.reached)
         return np.array([*boxes], np.float64).reshape(-1, 4)
 
     def isolated(self, i: int) -> IsolatedMask:
@@ -239,7 +333,7 @@ class LabelContext:
 
     def _draw_isolated(self, i: int) -> IsolatedMask:
         width, height = self.camera.width, self.camera.height
-        own, whole = self.projected[i]
+        own, whole = self.reached[i]
         x0, y0, x1, y1 = own if own and whole else EVERYWHERE
         if self.camera.lens.period is not None and x1 > width:
             x0, x1 = 0.0, float(width)  # a full turn has no canvas beside it

@@ -12,7 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewsphere.geometry.box3d import Box3d
-from viewsphere.geometry.rotation import compose, rigid
+from viewsphere.geometry.camera import project
+from viewsphere.geometry.rotation import compose, rigid, transform
 from viewsphere.model.annotations.appearance import Appearance
 from viewsphere.model.annotations.keypoints import Keypoints
 from viewsphere.model.annotations.symmetries import Symmetries
@@ -93,6 +94,7 @@ class ModelFacts(Protocol):
 class Placement:
     """One object in one picture: its model and pose (world from object), the camera, and the angular resolution of pose
     categories. `known` returns the facts about its model at the shown time step; it is called at the first access to `facts`.
+    `position` is the object's among the things of its shot.
     """
 
     spec: ModelSpec
@@ -101,6 +103,7 @@ class Placement:
     category_deg: float
     known: Callable[[], ModelFacts]
     step: TimeStep | None = None
+    position: int = -1
 
     @cached_property
     def facts(self) -> ModelFacts:
@@ -126,6 +129,17 @@ class Placement:
     def camera_from_object(self) -> Float:
         """Object axes to camera axes (OpenCV), (4, 4), rigid, metres."""
         return compose(self.camera_from_world, self.world_from_object)
+
+    def pixels(self, points: Float) -> Float:
+        """The pixels (n, 2) of points (n, 3) in the object's axes; NaN where the camera shows none. Under a rolling shutter,
+        they are those nearest in time to the instant.
+        """
+        if self.camera.rows is not None:
+            from viewsphere.truth.raster.rolling import pixels_in_rows
+
+            return pixels_in_rows(self.camera, self.camera.rows, self.position, self.world_from_object, points)[0]
+        in_camera = transform(self.camera_from_world, transform(self.world_from_object, points))
+        return project(self.camera.intrinsics, in_camera)[0]
 
     @cached_property
     def view(self) -> ObjectView:

@@ -6,8 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewsphere.geometry.camera import pixel_rays
+from viewsphere.geometry.rotation import product, transform
 from viewsphere.labels.shared.spec import Array, channel_of
-from viewsphere.model.sample import Sample
+from viewsphere.model.sample import ObjectAnnotation, Sample
 
 Float = NDArray[np.float64]
 
@@ -37,6 +38,24 @@ def misplaced(sample: Sample, points: Float, pixels: NDArray[np.bool_], slack: F
     if depth is not None:
         wrong |= ~(np.abs(z - depth[pixels]) <= slack)
     return wrong
+
+
+def in_camera_axes(sample: Sample, world: Float, pixels: NDArray[np.bool_]) -> Float:
+    """World points (N, 3) that the N True pixels show, in the camera's axes: under a rolling shutter, those of each row."""
+    rows = sample.camera.rows
+    if rows is None:
+        return transform(sample.camera.R, world) + sample.camera.t
+    row = np.nonzero(pixels)[0]
+    return product(rows.rotation[row], world[..., None])[..., 0] + rows.translation[row]
+
+
+def in_world_axes(sample: Sample, o: ObjectAnnotation, points: Float, pixels: NDArray[np.bool_]) -> Float:
+    """Points (N, 3) in an object's axes that the N True pixels show, in the world at the time of each pixel."""
+    rows = sample.camera.rows
+    if rows is None or o.id - 1 not in rows.moving:
+        return transform(o.world_from_object, points)
+    poses = rows.moving[o.id - 1][np.nonzero(pixels)[0]]
+    return product(poses[:, :3, :3], points[..., None])[..., 0] + poses[:, :3, 3]
 
 
 def largest(rows: Float) -> Float:

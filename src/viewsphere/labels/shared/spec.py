@@ -109,6 +109,10 @@ class LabelSpec(Spec):
         default=None,
         description="`refuses(intrinsics)`: the reason why pictures of this lens cannot have the label, None if they can",
     )
+    one_pose: bool = described(
+        default=False,
+        description="whether it requires that all rows of a picture have one pose; rolling shutters then refuse it",
+    )
     drawing: InstanceOf[Drawing] | None = described(default=None, description="the `Drawing` of previews and reports")
     names_categories: bool = described(
         default=False,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,14 +12,20 @@ from pydantic import BeforeValidator, Field, SerializeAsAny
 
 from viewsphere.geometry.lenses import Lens, LensParameters, lens_of, read_parameters
 from viewsphere.geometry.rotation import transform
-from viewsphere.model.fields.frozen import Frozen
+from viewsphere.model.fields.omit_none import OmitNone
+from viewsphere.model.sensors.rolling import Rolling, RowPoses
 
 Distortion = Annotated[SerializeAsAny[LensParameters], BeforeValidator(read_parameters)]
 """The model of a lens and its parameters; a mapping is read as the class of its model."""
 
 
-class Intrinsics(Frozen):
-    """Image size in pixels and the pinhole matrix K; pixel coordinates have their origin at the image's corner."""
+class Intrinsics(OmitNone):
+    """Image size in pixels and the pinhole matrix K; pixel coordinates have their origin at the image's corner.
+
+    `rolling` is the readout of a rolling shutter, None for a global one.
+    """
+
+    OMIT_IF_NONE = ("rolling",)
 
     width: int = Field(gt=0)
     height: int = Field(gt=0)
@@ -29,6 +35,7 @@ class Intrinsics(Frozen):
     cy: float
     skew: float = 0.0
     distortion: Distortion | None = None
+    rolling: Rolling | None = None
 
     @property
     def lens(self) -> Lens:
@@ -49,11 +56,13 @@ class Camera:
         intrinsics: Image size, camera matrix and distortion.
         R: (3, 3) float64, rotation from the world to the camera.
         t: (3,) float64, metres.
+        rows: The poses of its rows under a rolling shutter, while anything moves; R and t are then those of the instant.
     """
 
     intrinsics: Intrinsics
     R: NDArray[np.float64]
     t: NDArray[np.float64]
+    rows: RowPoses | None = None
 
     @property
     def K(self) -> NDArray[np.float64]:
@@ -74,6 +83,12 @@ class Camera:
     def center(self) -> NDArray[np.float64]:
         """Camera centre in the world, (3,) metres; do not write to it."""
         return -transform(self.R.T, self.t)
+
+    @property
+    def shutter_record(self) -> dict[str, Any]:
+        """The rolling shutter as plain data, `rolling_shutter`; empty for a global one."""
+        rolling = self.intrinsics.rolling
+        return {} if rolling is None else {"rolling_shutter": rolling.model_dump(mode="json")}
 
     @property
     def width(self) -> int:

@@ -69,6 +69,11 @@ class Rig(Frozen):
         return self
 
     @property
+    def rolls(self) -> bool:
+        """Return whether any camera has a rolling shutter."""
+        return any(sensor.intrinsics.rolling is not None for sensor in self.sensors)
+
+    @property
     def rectified(self) -> tuple[Pair, ...]:
         """The pairs of sensors with equal pinhole lenses and equal axes, one of them on the other's x axis."""
         return tuple(pair for pair in self._pairs if self.sensors[pair.left].intrinsics.lens.is_linear)

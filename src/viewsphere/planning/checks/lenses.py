@@ -2,21 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 from viewsphere import plugins
+from viewsphere.assets.animation.clip import Timeline
 from viewsphere.composing.viewpoints.poses import Poses
 from viewsphere.errors import RecipeError
 from viewsphere.geometry.lenses import LensOptions
 from viewsphere.labels import is_channel, label_named
 from viewsphere.model.channel import PASSES
+from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.sensors.camera import Intrinsics
 from viewsphere.model.sensors.rig import Rig
+from viewsphere.model.sensors.rolling import Rolling
 from viewsphere.plugins.engine import EngineSpec
 from viewsphere.recipe.cameras.rig import SensorList
 from viewsphere.recipe.draws import alternatives, span
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.recipe.world.scene import SceneEntry
+
+ROUNDING = 1e-9
+"""Share by which a readout may exceed the time between two instants, as neither is a binary fraction."""
 
 
 def check_lenses(recipe: Recipe, rig: Rig) -> None:
@@ -54,6 +60,15 @@ def _projections(recipe: Recipe, rig: Rig) -> Iterator[tuple[str, LensOptions, I
             yield "camera", recipe.camera.projection, sensor.intrinsics
 
 
+def check_rigid(recipe: Recipe, specs: Sequence[ModelSpec], lines: Sequence[Timeline | None]) -> None:
+    """Check that no model changes its shape while the rows of a rolling shutter are exposed."""
+    playing = [spec.key for spec, line in zip(specs, lines, strict=True) if line is not None]
+    if recipe.camera.rolling is not None and playing:
+        raise RecipeError(
+            f"camera.rolling: expected models that keep their shape; found the animated {playing[0]}: leave one of them out"
+        )
+
+
 def _limits(recipe: Recipe, rig: Rig) -> Iterator[tuple[str, str]]:
     """The recipe's fields that lenses rule out, each with the reason."""
     for sensor in rig.sensors:
@@ -61,8 +76,14 @@ def _limits(recipe: Recipe, rig: Rig) -> Iterator[tuple[str, str]]:
         for name in (*kept, *recipe.annotations):
             label = label_named(name)
             reason = label.refuses(sensor.intrinsics) if label is not None and label.refuses is not None else None
+            if reason is None and label is not None and label.one_pose and sensor.intrinsics.rolling is not None:
+                reason = (
+                    "expected no camera.rolling beside it, as it compares whole pictures of one pose; found one: leave it out"
+                )
             if reason is not None:
                 yield "channels" if is_channel(name) else "annotations", f"{name}: {reason}"
+        if sensor.intrinsics.rolling is not None:
+            yield from _of_rolling(recipe, sensor.intrinsics.rolling, sensor.intrinsics)
         lens = sensor.intrinsics.lens
         if lens.is_parallel and any(name in PASSES for name in kept):
             yield from _of_pictures(recipe, lens.name)
@@ -114,3 +135,27 @@ def _flat(scene: SceneEntry) -> Iterator[tuple[str, str]]:
         yield "background", "a picture"
     if any(abs(end) > 0 for end in span(scene.jitter.off_center)):
         yield "jitter.off_center", "an offset in a flat picture"
+
+
+def _of_rolling(recipe: Recipe, rolling: Rolling, intrinsics: Intrinsics) -> Iterator[tuple[str, str]]:
+    """The fields that a rolling shutter rules out, or requires."""
+    if recipe.time is None:
+        yield "camera.rolling", "expected time beside it, as still pictures have no time; found none: set time, or leave it out"
+        return
+    interval = 1 / recipe.time.fps
+    if rolling.readout > interval * (1 + ROUNDING):
+        found = f"at most {interval:g} s, the time between two instants; found {rolling.readout:g}"
+        yield "camera.rolling.readout", f"expected {found}: read out faster, or set a lower time.fps"
+    if not intrinsics.lens.is_linear:
+        yield "camera.rolling", f"expected a pinhole camera beside it; found {intrinsics.lens.name}: leave one of them out"
+    if recipe.camera.of_viewpoints:
+        yield "camera.rolling", "expected a lens of the recipe beside it; found camera.of_viewpoints: set fov_deg or K instead"
+    if recipe.time.shutter:
+        yield "time.shutter", f"expected 0 beside camera.rolling; found {recipe.time.shutter:g}: leave one of them out"
+    for where, scene in recipe.varied_scenes.items():
+        wet = ["wet"] if any(value not in ("off", "auto") for value in alternatives(scene.wet)) else []
+        for name in (*scene.precipitation, *wet):
+            yield f"{where}.{name}", f"expected off beside camera.rolling, whose rows it does not know; found {name}"
+    if not plugins.load(EngineSpec, recipe.engine.name).rolling:
+        engine = recipe.engine.name
+        yield "engine", f"expected one that paints rolling shutters beside camera.rolling; found {engine}: take raster"

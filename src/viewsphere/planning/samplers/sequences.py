@@ -144,9 +144,9 @@ def _shot(context: SamplingContext, subject: str, poses: Sequence[int], box_of: 
     def rig_at(instant: int) -> Matrix4:
         return _instant(context, state, subject, start + instant, box_of).world_from_rig
 
-    blurred = _exposures(state, [i if i in taken else None for i in numbers], time_of(context), rig_at)
+    exposed = _exposures(state, [i if i in taken else None for i in numbers], context, rig_at)
     more = {"sequence": context.sequence(subject, start), "tracks": _tracks(context, subject, start)}
-    return finished.model_copy(update=more | {"shutter": time_of(context).shutter, "exposures": blurred})
+    return finished.model_copy(update=more | {"shutter": time_of(context).shutter, "exposures": exposed})
 
 
 def _tracks(context: SamplingContext, subject: str, start: int) -> Tracks | None:
@@ -208,25 +208,32 @@ SAMPLER = SamplerSpec(
 
 
 def _exposures(
-    state: SequenceState, instants: Sequence[int | None], time: TimeEntry, rig_at: RigAt
+    state: SequenceState, instants: Sequence[int | None], context: SamplingContext, rig_at: RigAt
 ) -> tuple[Exposure | None, ...]:
     """Return the movements around each of these instants; empty for a shutter without duration.
     An instant has None where it is not recorded (None), and where nothing moves.
     """
-    if not time.shutter:
+    time, rolling = time_of(context), context.recipe.camera.rolling
+    length = time.shutter + (0.0 if rolling is None else rolling.readout * time.fps)
+    if not length:
         return ()
-    return tuple(None if at is None else _exposure(state, at, time, rig_at) for at in instants)
+    interval = None if rolling is None else 1 / time.fps
+    return tuple(None if at is None else _exposure(state, at, time, length, interval, rig_at) for at in instants)
 
 
-def _exposure(state: SequenceState, at: int, time: TimeEntry, rig_at: RigAt) -> Exposure | None:
-    things = tuple(None if moving is None or moving.is_still else _thing(moving, at, time) for moving in state.moving)
+def _exposure(
+    state: SequenceState, at: int, time: TimeEntry, length: float, interval: float | None, rig_at: RigAt
+) -> Exposure | None:
+    things = tuple(None if moving is None or moving.is_still else _thing(moving, at, length) for moving in state.moving)
     rig = _rig(at, time.count, rig_at)
-    return None if rig is None and not any(things) else Exposure(things=things, rig=rig)
+    return None if rig is None and not any(things) else Exposure(things=things, rig=rig, interval=interval)
 
 
-def _thing(moving: Moving, at: int, time: TimeEntry) -> Sweep | None:
-    """A thing's poses while the shutter is open; for a playing animation, its poses and time steps at the instants around."""
-    moments = AROUND if moving.plays_file else tuple(np.linspace(-0.5, 0.5, NODES) * time.shutter)
+def _thing(moving: Moving, at: int, length: float) -> Sweep | None:
+    """A thing's poses while the shutter is open, `length` instants long; for a playing animation, its poses and time steps at
+    the instants around.
+    """
+    moments = AROUND if moving.plays_file else tuple(np.linspace(-0.5, 0.5, NODES) * length)
     motion = moving.around(at, moments)
     return None if motion.is_still else Sweep(moments=tuple(map(float, moments)), motion=motion)
 

@@ -25,6 +25,7 @@ from viewsphere.model.fields.frozen import Frozen
 from viewsphere.model.fields.numbers import Count, Number, Positive
 from viewsphere.model.scene import WEATHER
 from viewsphere.model.sensors.camera import Intrinsics
+from viewsphere.model.sensors.rolling import Rolling
 from viewsphere.recipe.cameras.imager import ImagerField
 from viewsphere.recipe.cameras.lens import DistortionField
 from viewsphere.recipe.cameras.projection import WithProjection
@@ -125,6 +126,9 @@ class CameraEntry(WithProjection):
     distortion: DistortionField | None = Field(
         default=None, description="lens model and its parameters: {model: fisheye, coefficients: [k1, k2, k3, k4]}"
     )
+    rolling: Rolling | None = Field(
+        default=None, description="a rolling shutter, of all cameras of a rig: {readout: 0.03, direction: down}; needs time"
+    )
     of_viewpoints: Literal[True] | None = Field(
         default=None, description="true: size and lens from the viewpoints' file (nerfstudio, COLMAP)"
     )
@@ -139,7 +143,7 @@ class CameraEntry(WithProjection):
     @model_validator(mode="before")
     @classmethod
     def _default_lens(cls, data: Any) -> Any:
-        return {"fov_deg": 40.0, **data} if isinstance(data, dict) and not data.keys() - {"size", "imager"} else data
+        return {"fov_deg": 40.0, **data} if isinstance(data, dict) and not data.keys() - {"size", "imager", "rolling"} else data
 
     @field_validator("sensor_mm", mode="before")
     @classmethod
@@ -181,7 +185,7 @@ class CameraEntry(WithProjection):
         """The lens as focal lengths and principal point in pixels, once it is drawn."""
         width, height = self.size
         if self.projection is not None:
-            return _calibrated(self.projection, self.size)
+            return _calibrated(self.projection, self.size, self.rolling)
         cx, cy = self.principal_point or (width / 2, height / 2)
         skew = 0.0
         if self.K is not None:
@@ -197,7 +201,17 @@ class CameraEntry(WithProjection):
             across = width if self.fov_axis == "horizontal" else height
             fx = fy = _focal_length(self.fov_deg, across, self.distortion)
         with told_of("camera"):
-            return Intrinsics(width=width, height=height, fx=fx, fy=fy, cx=cx, cy=cy, skew=skew, distortion=self.distortion)
+            return Intrinsics(
+                width=width,
+                height=height,
+                fx=fx,
+                fy=fy,
+                cx=cx,
+                cy=cy,
+                skew=skew,
+                distortion=self.distortion,
+                rolling=self.rolling,
+            )
 
 
 def _focal_length(fov_deg: float, extent: int, distortion: LensParameters | None) -> float:
@@ -207,13 +221,13 @@ def _focal_length(fov_deg: float, extent: int, distortion: LensParameters | None
         raise RecipeError(f"camera.fov_deg: {error}") from None
 
 
-def _calibrated(options: LensOptions, size: tuple[int, int]) -> Intrinsics:
+def _calibrated(options: LensOptions, size: tuple[int, int], rolling: Rolling | None) -> Intrinsics:
     try:
         calibration = options.calibration(size)
     except ValueError as error:
         raise RecipeError(f"camera: {error}") from None
     with told_of("camera"):
-        return Intrinsics(width=size[0], height=size[1], **calibration._asdict())
+        return Intrinsics(width=size[0], height=size[1], **calibration._asdict(), rolling=rolling)
 
 
 class SceneEntry(Frozen):

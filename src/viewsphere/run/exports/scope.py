@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from viewsphere import plugins
 from viewsphere.errors import UserError
 from viewsphere.formats import Scope
-from viewsphere.formats.shared.writing.refusals import central, depth_lenses, lacking_labels
+from viewsphere.formats.shared.writing.refusals import central, depth_lenses, global_shutter, lacking_labels
 from viewsphere.labels import label_named, label_names
 from viewsphere.model.channel import PASSES, missing, picture_of
 from viewsphere.model.sample import Sample
@@ -125,6 +125,8 @@ def not_held(spec: FormatSpec, entry: FormatEntry, scope: Scope) -> Iterator[str
         yield from depth_lenses(scope)
     if not spec.parallel_rays:
         yield from central(scope)
+    if not spec.rolling:
+        yield from global_shutter(scope)
     if spec.refuses is not None:
         yield from spec.refuses(scope, *entry.arguments())
 

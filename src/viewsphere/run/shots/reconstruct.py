@@ -118,7 +118,7 @@ class ViewReconstructor:
             return None
         info = self._models[o.key]
         pose = _matrix(o.world_from_object)
-        return Placement(_spec(info), pose, sample.camera, shot.category_deg, lambda: info, _step(info))
+        return Placement(_spec(info), pose, sample.camera, shot.category_deg, lambda: info, _step(info), o.id - 1)
 
     def _built(self, sample: Sample, shot: Shot, around: SceneryRecord) -> Geometry | None:
         """The geometry that a sample shows; None if scenery has changed."""
@@ -220,7 +220,7 @@ class _Made:
             update={
                 "instants": inserted(own, instant.model_copy(update={"recorded": False})),
                 "things": tuple(map(moved, self.shot.things, other.shot.things)),
-                "exposures": inserted(self.shot.exposures, None) if self.shot.shutter else (),
+                "exposures": inserted(self.shot.exposures, other.shot.exposures[at]) if self.shot.exposures else (),
             }
         )
         behind = tuple(map(moved, self.around.things, other.around.things))

@@ -440,8 +440,9 @@ class Store:
 
 
 def kept_shot(shot: Shot) -> Shot:
-    """The shot as stored in shot.json: without the things of scenery.json, and with the labels of the instant."""
-    return shot.model_copy(update={"things": shot.objects, "shutter": 0.0, "exposures": ()})
+    """The shot as stored in shot.json: without the things of scenery.json, and with the motions that labels depend on."""
+    exposures = shot.exposures if shot.rig.rolls else ()
+    return shot.model_copy(update={"things": shot.objects, "shutter": 0.0, "exposures": exposures})
 
 
 def _no_scene(file: Path, error: Exception) -> StoreError:

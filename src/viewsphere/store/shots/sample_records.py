@@ -212,5 +212,5 @@ class ShotRecords:
             if pose is None:
                 raise ValueError(f"object {record['id']}: expected one that is there")
             facts = partial(self.facts, spec.key, step and step.frame)
-            placement = Placement(spec, pose, camera, self.shot.category_deg, facts, step)
+            placement = Placement(spec, pose, camera, self.shot.category_deg, facts, step, record["id"] - 1)
             yield from_short_record(record, placement, self._makers)

@@ -46,17 +46,23 @@ def cells(q, samples, x0, y0, width, height, cell):
     triangle is outside. They are BEHIND if w <= 0.
     """
     for i in range(q.shape[0]):
-        w = q[i, 2]
-        if w > 0.0:
-            x = q[i, 0] * q[i, 3] * samples - (0.5 + x0)
-            y = q[i, 1] * q[i, 3] * samples - (0.5 + y0)
-            cell[i, 0] = math.ceil(min(max(x - EPSILON, 0.0), float(width)))
-            cell[i, 1] = math.ceil(min(max(y - EPSILON, 0.0), float(height)))
-            cell[i, 2] = -math.floor(min(max(x + EPSILON, -1.0), width - 1.0))
-            cell[i, 3] = -math.floor(min(max(y + EPSILON, -1.0), height - 1.0))
-        else:
-            for k in range(4):
-                cell[i, k] = BEHIND
+        bound_vertex(q, i, samples, x0, y0, width, height, cell)
+
+
+@inner
+def bound_vertex(q, i, samples, x0, y0, width, height, cell):
+    """Fill the row of `cells` for one vertex."""
+    w = q[i, 2]
+    if w > 0.0:
+        x = q[i, 0] * q[i, 3] * samples - (0.5 + x0)
+        y = q[i, 1] * q[i, 3] * samples - (0.5 + y0)
+        cell[i, 0] = math.ceil(min(max(x - EPSILON, 0.0), float(width)))
+        cell[i, 1] = math.ceil(min(max(y - EPSILON, 0.0), float(height)))
+        cell[i, 2] = -math.floor(min(max(x + EPSILON, -1.0), width - 1.0))
+        cell[i, 3] = -math.floor(min(max(y + EPSILON, -1.0), height - 1.0))
+    else:
+        for k in range(4):
+            cell[i, k] = BEHIND
 
 
 @inner
@@ -132,42 +138,53 @@ def draw(q, cell, triangles, span, canvas, cutout, alpha_masks, nearest, seen):
     `span` is the first triangle, the one after the last, and the number of the vertex in q[0]. `canvas` is the number of
     samples along a pixel's side and the canvas' first sample (x, y). `cell` is BEHIND for the vertices of endless triangles.
     """
-    height, width = nearest.shape
     first, last, base = span
-    a, b, c, d = np.uintp(0), np.uintp(1), np.uintp(2), np.uintp(3)
+    a, b, c = np.uintp(0), np.uintp(1), np.uintp(2)
+    rows = (0, nearest.shape[0] - 1)
     for t in range(first, last):
         ut = np.uintp(t)
         i0, i1, i2 = np.uintp(triangles[ut, a] - base), np.uintp(triangles[ut, b] - base), np.uintp(triangles[ut, c] - base)
-        xa, ya = min(cell[i0, a], cell[i1, a], cell[i2, a]), min(cell[i0, b], cell[i1, b], cell[i2, b])
-        xb, yb = -min(cell[i0, c], cell[i1, c], cell[i2, c]), -min(cell[i0, d], cell[i1, d], cell[i2, d])
-        if xa > xb or ya > yb or cutout[ut] == NEVER:
-            continue
-        most = max(q[i0, d], q[i1, d], q[i2, d]) * (ROUNDED_UP / NEARER)
-        is_small = xb - xa < SMALL and width >= FOUR
-        if is_small and hidden(nearest, xa, ya, xb, yb, most):
-            continue
-        q0, q1, q2 = (q[i0, a], q[i0, b], q[i0, c]), (q[i1, a], q[i1, b], q[i1, c]), (q[i2, a], q[i2, b], q[i2, c])
-        crossing = xa == BEHIND
-        if crossing:
-            if q0[2] <= 0.0 and q1[2] <= 0.0 and q2[2] <= 0.0 and cutout[ut] >= NEVER:
-                continue
-            xa, ya, xb, yb = 0, 0, width - 1, height - 1
-        nx, ny, nz, det = plane(q0, q1, q2)
-        if det == 0.0:
-            continue
-        box = (xa, ya, xb, yb)
-        w0, w1, w2 = q0[2], q1[2], q2[2]
-        if cutout[ut] >= 0 or (not crossing and abs(det) < SLIVER * (w0 * w1 * w2)):
-            bounds = (0.0, np.inf) if crossing else (1.0 / max(w0, w1, w2), 1.0 / min(w0, w1, w2))
-            _draw_checked(t, q0, q1, q2, box, canvas, bounds, cutout[ut], alpha_masks, nearest, seen)
-            continue
-        e0, e1, e2 = edges_inside(q0, q1, q2, (nx, ny, nz), det, cutout[ut])
-        inverse = 1.0 / det
-        n = (nx * inverse, ny * inverse, nz * inverse)
-        if is_small:
-            _draw_small(t, e0, e1, e2, n, box, canvas, nearest, seen)
-        else:
-            _draw_rows(t, e0, e1, e2, n, box, canvas, nearest, seen)
+        draw_one(t, q, cell, (i0, i1, i2), rows, canvas, cutout[ut], alpha_masks, nearest, seen)
+
+
+@inner
+def draw_one(t, q, cell, corners, rows, canvas, cut, alpha_masks, nearest, seen):
+    """Draw triangle t, whose `corners` are rows of q and cell, into these rows of the canvas, the last one included."""
+    width = nearest.shape[1]
+    a, b, c, d = np.uintp(0), np.uintp(1), np.uintp(2), np.uintp(3)
+    i0, i1, i2 = corners
+    xa, ya = min(cell[i0, a], cell[i1, a], cell[i2, a]), min(cell[i0, b], cell[i1, b], cell[i2, b])
+    xb, yb = -min(cell[i0, c], cell[i1, c], cell[i2, c]), -min(cell[i0, d], cell[i1, d], cell[i2, d])
+    crossing = xa == BEHIND
+    if not crossing:
+        ya, yb = max(ya, rows[0]), min(yb, rows[1])
+    if xa > xb or ya > yb or cut == NEVER:
+        return
+    most = max(q[i0, d], q[i1, d], q[i2, d]) * (ROUNDED_UP / NEARER)
+    is_small = xb - xa < SMALL and width >= FOUR
+    if is_small and hidden(nearest, xa, ya, xb, yb, most):
+        return
+    q0, q1, q2 = (q[i0, a], q[i0, b], q[i0, c]), (q[i1, a], q[i1, b], q[i1, c]), (q[i2, a], q[i2, b], q[i2, c])
+    if crossing:
+        if q0[2] <= 0.0 and q1[2] <= 0.0 and q2[2] <= 0.0 and cut >= NEVER:
+            return
+        xa, ya, xb, yb = 0, rows[0], width - 1, rows[1]
+    nx, ny, nz, det = plane(q0, q1, q2)
+    if det == 0.0:
+        return
+    box = (xa, ya, xb, yb)
+    w0, w1, w2 = q0[2], q1[2], q2[2]
+    if cut >= 0 or (not crossing and abs(det) < SLIVER * (w0 * w1 * w2)):
+        bounds = (0.0, np.inf) if crossing else (1.0 / max(w0, w1, w2), 1.0 / min(w0, w1, w2))
+        _draw_checked(t, q0, q1, q2, box, canvas, bounds, cut, alpha_masks, nearest, seen)
+        return
+    e0, e1, e2 = edges_inside(q0, q1, q2, (nx, ny, nz), det, cut)
+    inverse = 1.0 / det
+    n = (nx * inverse, ny * inverse, nz * inverse)
+    if is_small:
+        _draw_small(t, e0, e1, e2, n, box, canvas, nearest, seen)
+    else:
+        _draw_rows(t, e0, e1, e2, n, box, canvas, nearest, seen)
 
 
 @inner

@@ -13,6 +13,7 @@ from viewsphere.geometry.camera import inverse_camera_matrix, pixel_rays
 from viewsphere.geometry.lenses import Window
 from viewsphere.model.sensors.camera import Camera, Intrinsics
 from viewsphere.truth.raster.geometry import Geometry, seen_from
+from viewsphere.truth.raster.rolling import rolled
 
 LARGEST_AROUND = 4_000_000  # pixels of a ray table that reaches beyond the image (100 MB)
 
@@ -58,6 +59,7 @@ class Visibility:
     inverse_depth: NDArray[np.float32]
     corners: NDArray[np.float64] | None = None  # `homogeneous` of all vertices, which labels and the raster engine use again
     exact: NDArray[np.float64] | None = None  # 1/s before rounding, if requested
+    reached: NDArray[np.bool_] | None = None  # under a rolling shutter, the things that may be in the picture
     _instances: dict[Geometry, Instances] = field(default_factory=dict[Geometry, Instances], repr=False)
 
     def instances(self, geometry: Geometry) -> Instances:
@@ -100,6 +102,9 @@ def rasterize(
     vertices, if already computed. `keeps_exact`: also keep 1/s before rounding, which labels that compare pictures need. Still
     pictures do not need that memory.
     """
+    if camera.rows is not None:
+        nearest, seen, reached = rolled(geometry, camera, camera.rows, subdivision, object_id, window)
+        return Visibility(seen, nearest.astype(np.float32), None, nearest, reached)
     is_whole = not object_id and window is None
     if object_id:
         part = _range(geometry, object_id)
@@ -200,6 +205,14 @@ def left_out(geometry: Geometry, q: NDArray[np.float64]) -> NDArray[np.bool_]:
     """Return a mask of the things that are left out of their `homogeneous` vertices q."""
     first = _first_vertices(geometry.vertex_start, len(q))
     return (q[first] == _OUTSIDE).all(axis=1) if len(q) else first < 0
+
+
+def things_in(geometry: Geometry, camera: Camera, visibility: Visibility) -> list[int]:
+    """The things that may be in a camera's picture."""
+    if visibility.reached is not None:
+        return np.flatnonzero(visibility.reached).tolist()
+    q = homogeneous(geometry, camera) if visibility.corners is None else visibility.corners
+    return np.flatnonzero(~left_out(geometry, q)).tolist()
 
 
 @lru_cache(maxsize=4)

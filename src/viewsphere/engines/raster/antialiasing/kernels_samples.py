@@ -31,6 +31,7 @@ from viewsphere.truth.raster.kernels_draw import (
 )
 from viewsphere.truth.raster.kernels_parallel import covers, depth_at, surface_of
 from viewsphere.truth.raster.kernels_rays import ABOVE, ANY_DEPTH, LEAF, NO_BOX, leaf_list, limits, pixel_box, touched
+from viewsphere.truth.raster.kernels_rolling import BAND, is_turned_away, list_active, project_vertex
 
 U = nb.uintp
 TIE = 1e-5  # relative difference of 1/z below which two surfaces count as coincident
@@ -113,49 +114,58 @@ def draw(q, order, triangles, cutout, alpha_masks, see_through, points, solid, f
     `points` is (grid, pixels, offsets, (lowest, highest offset)), `solid` (nearest, seen, farthest, tiles), `fragments`
     (inverses, listed, counts, q).
     """
+    found = np.empty(max(points[0].shape[1], MEDIUM * MEDIUM) + 1, np.uint32)
+    rows = (0, points[0].shape[0] - 1)
+    for i in range(U(order.shape[0])):
+        t = order[i]
+        _draw_one(t, q, triangles, rows, cutout, alpha_masks, see_through, points, solid, fragments, found)
+
+
+@inner
+def _draw_one(t, q, triangles, rows, cutout, alpha_masks, see_through, points, solid, fragments, found):
+    """Draw a triangle into these rows, the last one included."""
     grid, _, _, _ = points
     farthest, tiles = solid[2], solid[3][1]
     height, width = grid.shape
-    found = np.empty(max(width, MEDIUM * MEDIUM) + 1, np.uint32)
     a, b, c, d = U(0), U(1), U(2), U(3)
-    for i in range(U(order.shape[0])):
-        t = order[i]
-        ut = U(t)
-        i0, i1, i2 = U(triangles[ut, a]), U(triangles[ut, b]), U(triangles[ut, c])
-        endless = cutout[ut] < NEVER
-        xa, ya, xb, yb = (BEHIND, 0, 0, 0) if endless else _box(q, i0, i1, i2, points[3], width, height)
-        if xa > xb or ya > yb or cutout[ut] == NEVER:
-            continue
-        most = level(np.inf if endless else max(q[i0, d], q[i1, d], q[i2, d]) * (ROUNDED_UP + TIE))
-        narrow = xb - xa < NARROW and yb - ya < NARROW
-        count = 0
-        if xa != BEHIND and _is_hidden(tiles, xa, ya, xb, yb, most):
-            continue
-        if narrow:
-            count = _open(farthest, xa, ya, xb, yb, most, found)
-            if count == 0:
-                continue
-        q0, q1, q2 = (q[i0, a], q[i0, b], q[i0, c]), (q[i1, a], q[i1, b], q[i1, c]), (q[i2, a], q[i2, b], q[i2, c])
-        w0, w1, w2 = q0[2], q1[2], q2[2]
-        crossing = xa == BEHIND
-        if crossing:
-            xa, ya, xb, yb = 0, 0, width - 1, height - 1
-        nx, ny, nz, det = plane(q0, q1, q2)
-        if det == 0.0 or (w0 <= 0.0 and w1 <= 0.0 and w2 <= 0.0 and not endless):
-            continue
-        e0, e1, e2 = edges_inside(q0, q1, q2, (nx, ny, nz), det, cutout[ut])
-        checked = cutout[ut] >= 0 or see_through[ut] or (not crossing and abs(det) < SLIVER * (w0 * w1 * w2))
-        bounds = (0.0, np.inf)
-        if checked and not crossing:
-            bounds = (1.0 / max(w0, w1, w2), 1.0 / min(w0, w1, w2))
-        surface = (t, cutout[ut], see_through[ut], (nx, ny, nz, det), bounds)
-        box, edges = (xa, ya, xb, yb), (e0, e1, e2)
-        if not narrow:
-            _draw_wide(surface, edges, checked, box, most, found, points, alpha_masks, triangles, solid, fragments)
-        elif checked:
-            _draw_checked(surface, edges, found, count, points, alpha_masks, triangles, solid, fragments)
-        else:
-            _draw_solid(surface, edges, found, count, points, solid)
+    ut = U(t)
+    i0, i1, i2 = U(triangles[ut, a]), U(triangles[ut, b]), U(triangles[ut, c])
+    endless = cutout[ut] < NEVER
+    xa, ya, xb, yb = (BEHIND, 0, 0, 0) if endless else _box(q, i0, i1, i2, points[3], width, height)
+    crossing = xa == BEHIND
+    if not crossing:
+        ya, yb = max(ya, rows[0]), min(yb, rows[1])
+    if xa > xb or ya > yb or cutout[ut] == NEVER:
+        return
+    most = level(np.inf if endless else max(q[i0, d], q[i1, d], q[i2, d]) * (ROUNDED_UP + TIE))
+    narrow = xb - xa < NARROW and yb - ya < NARROW
+    count = U(0)
+    if not crossing and _is_hidden(tiles, xa, ya, xb, yb, most):
+        return
+    if narrow:
+        count = _open(farthest, xa, ya, xb, yb, most, found)
+        if count == 0:
+            return
+    q0, q1, q2 = (q[i0, a], q[i0, b], q[i0, c]), (q[i1, a], q[i1, b], q[i1, c]), (q[i2, a], q[i2, b], q[i2, c])
+    w0, w1, w2 = q0[2], q1[2], q2[2]
+    if crossing:
+        xa, ya, xb, yb = 0, rows[0], width - 1, rows[1]
+    nx, ny, nz, det = plane(q0, q1, q2)
+    if det == 0.0 or (w0 <= 0.0 and w1 <= 0.0 and w2 <= 0.0 and not endless):
+        return
+    e0, e1, e2 = edges_inside(q0, q1, q2, (nx, ny, nz), det, cutout[ut])
+    checked = cutout[ut] >= 0 or see_through[ut] or (not crossing and abs(det) < SLIVER * (w0 * w1 * w2))
+    bounds = (0.0, np.inf)
+    if checked and not crossing:
+        bounds = (1.0 / max(w0, w1, w2), 1.0 / min(w0, w1, w2))
+    surface = (t, cutout[ut], see_through[ut], (nx, ny, nz, det), bounds)
+    box, edges = (xa, ya, xb, yb), (e0, e1, e2)
+    if not narrow:
+        _draw_wide(surface, edges, checked, box, most, found, points, alpha_masks, triangles, solid, fragments)
+    elif checked:
+        _draw_checked(surface, edges, found, count, points, alpha_masks, triangles, solid, fragments)
+    else:
+        _draw_solid(surface, edges, found, count, points, solid)
 
 
 @inner
@@ -568,3 +578,36 @@ def _cast_parallel(surface, found, count, grid, offsets, alpha_masks, triangles,
                     nearest[at], seen[at] = inverse, t
             least = min(least, level(nearest[at]))
         farthest[row, column] = max(farthest[row, column], least)
+
+
+@njit(_nrt=True)
+def draw_rolling(
+    world, triangles, single, chosen, cutout, alpha_masks, see_through, spans, edge_on, points, solid, fragments, q
+):
+    """The equivalent of `draw` under a rolling shutter, for the triangles in `chosen` (T,); world, single, spans and edge_on
+    are those of `kernels_rolling.draw`. q (V, 4), also in `fragments`, holds the vertices of the row that is drawn.
+    """
+    grid = points[0]
+    height, width = grid.shape
+    found = np.empty(max(width, MEDIUM * MEDIUM) + 1, np.uint32)
+    count = world[0].shape[0]
+    bounds, stamp = np.empty((count, 4), np.int32), np.full(count, -1, np.int32)
+    active = np.empty((triangles.shape[0], 4), np.int32)
+    for begin in range(0, height, BAND):
+        band = (begin, min(begin + BAND, height))
+        n = list_active(world, triangles, cutout, spans, band, (1, 0, 0), (width, height), bounds, active)
+        for y in range(band[0], band[1]):
+            if points[1][first(grid, y, 0)] >= (y + 1) * width:
+                continue  # no pixel of the row is chosen
+            for k in range(n):
+                t, i = U(active[k, 0]), active[k, 1]
+                if y < active[k, 2] or y > active[k, 3] or not chosen[t] or (i == world[3].shape[0] and edge_on[y]):
+                    continue
+                corners = U(triangles[t, 0]), U(triangles[t, 1]), U(triangles[t, 2])
+                for v in corners:
+                    if stamp[v] != y:
+                        stamp[v] = y
+                        project_vertex(world, i, y, v, q)
+                if single[t] and is_turned_away(q, corners[0], corners[1], corners[2]):
+                    continue
+                _draw_one(np.int64(t), q, triangles, (y, y), cutout, alpha_masks, see_through, points, solid, fragments, found)

@@ -14,7 +14,9 @@ from viewsphere.engines.raster.antialiasing import kernels_chosen, kernels_edges
 from viewsphere.engines.raster.antialiasing import kernels_samples as kernels
 from viewsphere.geometry.camera import pixel_rays
 from viewsphere.model.sensors.camera import Camera, Intrinsics
+from viewsphere.model.sensors.rolling import RowPoses
 from viewsphere.truth.raster.geometry import Geometry, seen_from
+from viewsphere.truth.raster.rolling import edge_on, rolled_world, single_of, spans_of
 from viewsphere.truth.raster.visibility import (
     RayTable,
     Runs,
@@ -22,8 +24,8 @@ from viewsphere.truth.raster.visibility import (
     homogeneous,
     in_picture,
     index_rays,
-    left_out,
     lens_table,
+    things_in,
 )
 
 OFFSETS = ((0.375, 0.125), (0.875, 0.375), (0.625, 0.875), (0.125, 0.625))
@@ -83,15 +85,17 @@ def edge_samples(
     rasteriser at that point. With a pinhole, nearly all samples are. A triangle is left out if no centre nearby shows it and it
     has no corner in such a pixel (`kernels_edges`). The sample then shows the surface behind it, or the one at the centre.
     """
-    q = homogeneous(geometry, camera) if visibility.corners is None else visibility.corners
-    geometry = seen_from(geometry, q)
-    normals = geometry.triangle_normals_of(np.flatnonzero(~left_out(geometry, q)).tolist())
+    rows = camera.rows
+    q = np.empty((0, 4)) if rows is not None else visibility.corners
+    q = homogeneous(geometry, camera) if q is None else q
+    geometry = geometry if rows is not None else seen_from(geometry, q)
+    normals = geometry.triangle_normals_of(things_in(geometry, camera, visibility))
     look = visibility.triangle, visibility.inverse_depth, owner, normals
     marks = _differs_from_neighbour(*look)
     if camera.lens.period is not None:
         _mark_across_seam(marks, *look)
     marks[: len(behind)] |= behind
-    if camera.lens.is_linear:
+    if camera.lens.is_linear and rows is None:
         pixels, position, triangle, inverse = _pinhole_edges(geometry, visibility, marks, q, owner, normals, behind)
         samples = Samples(pixels, position, np.zeros((0, 3), np.float32), triangle, inverse)
     else:
@@ -155,9 +159,12 @@ def layers(
     """
     if not see_through.any():
         return []
-    q = homogeneous(geometry, camera) if corners is None else corners
-    geometry = seen_from(geometry, q)
-    clear = _within(in_picture(geometry, q)[1], see_through)
+    if camera.rows is not None:
+        q, clear = np.empty((0, 4)), np.flatnonzero(see_through)
+    else:
+        q = homogeneous(geometry, camera) if corners is None else corners
+        geometry = seen_from(geometry, q)
+        clear = _within(in_picture(geometry, q)[1], see_through)
     shape, count = (camera.height, camera.width), 1 if pixels is None else 4
     shown = triangle.reshape(-1, count), inverse_depth.reshape(-1, count)
     farthest = kernels_chosen.shown_farthest(*shown, _NO_PIXELS if pixels is None else pixels, *shape)
@@ -165,7 +172,7 @@ def layers(
     if pixels is not None:
         row_of = np.zeros(shape[0] * shape[1], np.int32)
         row_of[pixels] = np.arange(len(pixels))
-    if camera.lens.is_linear:
+    if camera.lens.is_linear and camera.rows is None:
         reach = _CENTER_REACH if count == 1 else _ROTATED_REACH
         chosen = np.flatnonzero(kernels.touched_boxes(q, clear, geometry.triangles, reach, farthest))
     else:
@@ -212,7 +219,7 @@ def _pile(
     points.farthest[:] = kernels_chosen.CLOSED
     points.farthest.reshape(-1)[points.pixels[:-1][behind]] = 0
     if behind.any():
-        if points.camera.lens.is_linear:
+        if points.camera.lens.is_linear and points.camera.rows is None:
             y, x = np.divmod(points.pixels[:-1][behind], points.camera.width)
             window = x.min(), y.min(), x.max(), y.max()
             surfaces = geometry.triangles, in_picture(geometry, q), geometry.triangle_cutout
@@ -292,6 +299,9 @@ class _Points:
     def draw(self, geometry: Geometry, q: NDArray[np.float64], see_through: Bool, order: NDArray[np.int64]) -> None:
         """Draw these triangles."""
         count, lens = self.nearest.shape[1], self.camera.lens
+        if self.camera.rows is not None:
+            self._draw_rows(geometry, self.camera.rows, see_through, order)
+            return
         fragments = self.inverses, self.listed, self.counts, q
         surfaces = order, geometry.triangles, geometry.triangle_cutout, geometry.alpha_masks.arrays, see_through
         solid = self.nearest, self.seen, self.farthest, kernels_chosen.tiled(self.farthest)
@@ -303,6 +313,20 @@ class _Points:
         side, table = self.table
         points = self.grid, self.rays, side, *table.placed(q)
         kernels.draw_rays(q, *surfaces, lens.has_unit_rays, table.arrays, points, solid, fragments)
+
+    def _draw_rows(self, geometry: Geometry, rows: RowPoses, see_through: Bool, order: NDArray[np.int64]) -> None:
+        """Draw these triangles under a rolling shutter."""
+        offsets, reach = (_CENTER, _CENTER_REACH) if self.nearest.shape[1] == 1 else (_ROTATED, _ROTATED_REACH)
+        chosen = np.zeros(len(geometry.triangles), np.bool_)
+        chosen[order] = True
+        q = np.empty((len(geometry.coordinates), 4))
+        surfaces = chosen, geometry.triangle_cutout, geometry.alpha_masks.arrays, see_through
+        solid = self.nearest, self.seen, self.farthest, kernels_chosen.tiled(self.farthest)
+        kernels.draw_rolling(
+            tuple(rolled_world(geometry, self.camera, rows)),
+            *(geometry.triangles, single_of(geometry), *surfaces, spans_of(geometry), edge_on(geometry, rows)),
+            *((self.grid, self.pixels, offsets, reach), solid, (self.inverses, self.listed, self.counts, q), q),
+        )
 
 
 def _differs_from_neighbour(triangle: Int32, depth: Float32, owner: Int32, normals: Float32) -> NDArray[np.uint8]:
@@ -391,7 +415,7 @@ def _differing(count: int, *known: NDArray[Any]) -> tuple[Int32, Float32, Int32,
 
 
 def _sample_rays(camera: Camera, pixels: Int32) -> Float32:
-    if camera.lens.is_parallel:
+    if camera.lens.is_straight:
         return np.zeros((0, 3), np.float32)
     y, x = np.divmod(pixels, camera.width)
     table, quarter = _sample_table(camera.intrinsics.model_dump_json()).rays, np.arange(4)

@@ -21,7 +21,7 @@ from viewsphere.model.thing import Repaint, Thing
 from viewsphere.rendering.ground.material import ground_frame, ground_material
 from viewsphere.truth.raster.geometry import UP, Geometry, read_only
 from viewsphere.truth.raster.sparse import sparse
-from viewsphere.truth.raster.visibility import Visibility, homogeneous, left_out
+from viewsphere.truth.raster.visibility import Visibility, things_in
 
 
 class Lengths(NamedTuple):
@@ -119,8 +119,7 @@ class Rows:
 
     def write_seen(self, camera: Camera, visibility: Visibility, geometry: Geometry) -> None:
         """Write the rows, and the facing, of triangles that may be in a picture."""
-        q = homogeneous(geometry, camera) if visibility.corners is None else visibility.corners
-        seen = np.flatnonzero(~left_out(geometry, q)).tolist()
+        seen = things_in(geometry, camera, visibility)
         self.write(seen)
         self.geometry.triangle_normals_of(seen)
 

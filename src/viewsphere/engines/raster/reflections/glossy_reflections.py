@@ -52,7 +52,7 @@ def mirror_in_polish(baked: Baked, camera: Camera, visibility: Visibility, radia
     gloss = np.empty((len(at), kernels_split.GLOSS), np.float32)
     triangle, depth = visibility.triangle.reshape(-1), visibility.inverse_depth.reshape(-1)
     light = baked.surrounding, baked.occlusion, baked.bounces
-    own = view_of(baked, camera), baked.surfaces, baked.textures, baked.floor
+    own = view_of(baked, camera, triangle=triangle), baked.surfaces, baked.textures, baked.floor
     kernels_split.gloss(*own, *light, at.astype(np.int32), triangle, depth, gloss)
     shines = gloss[:, 6] < MATT
     if not shines.all():

@@ -13,9 +13,12 @@ from viewsphere.engines.raster.reflections import kernels_mirror as kernels
 from viewsphere.engines.raster.shading.painting import NO_SPLIT, Baked, shade_all, view_of
 from viewsphere.engines.raster.sky.environment import sky_behind
 from viewsphere.geometry.camera import inverse_camera_matrix
+from viewsphere.geometry.rotation import product
 from viewsphere.model.sensors.camera import Camera
+from viewsphere.model.sensors.rolling import RowPoses
 from viewsphere.truth.raster.alpha_masks import NEVER
 from viewsphere.truth.raster.geometry import Geometry, with_both_sides
+from viewsphere.truth.raster.rolling import centers_of, ways_of_rows
 from viewsphere.truth.raster.visibility import Visibility, lens_rays_to, rasterize
 
 Float = NDArray[np.float64]
@@ -47,11 +50,19 @@ def looked_at(camera: Camera, visibility: Visibility, at: NDArray[np.intp]) -> t
     the rays end.
     """
     rays, camera_from_pixel = lens_rays_to(camera, visibility.inverse_depth), inverse_camera_matrix(camera.intrinsics)
+    shifts = None
+    if camera.rows is not None:
+        turns, shifts = ways_of_rows(camera, camera.rows, {})
+        row, column = np.indices(visibility.triangle.shape) + 0.5
+        pixels = np.stack([column, row, np.ones_like(row)], axis=-1)
+        rays = product(turns[0][:, None], pixels[..., None])[..., 0]
     table = np.zeros((0, 3)) if rays is None else rays.reshape(-1, 3)
     table.setflags(write=False)  # same type as for a lens, for one compilation
     cosine, place = np.empty(len(at)), np.empty((len(at), 3))
     pose, depth = (camera.R, camera.center), visibility.inverse_depth.reshape(-1)
     kernels.meet(at, camera.width, table, camera_from_pixel, *pose, depth, cosine, place)
+    if shifts is not None:
+        place += shifts[0, at // camera.width]
     if camera.lens.is_parallel:
         cosine[:] = max(-camera.R[2, 2], 0.0)
     return cosine, place
@@ -70,17 +81,17 @@ def mirrored(baked: Baked, camera: Camera, plane: float, left_out: NDArray[np.bo
     below = _below(camera, plane)
     geometry, blended = (_without(geometry, left_out) for geometry in (baked.geometry, baked.blended))
     mirror = replace(baked, geometry=geometry, blended=blended, is_fine=False)
-    visibility, view = rasterize(geometry, below), view_of(baked, below)
+    visibility = rasterize(geometry, below)
     baked.rows.write_seen(below, visibility, geometry)
     triangle, depth = np.full(visibility.triangle.size, -1, np.int32), np.zeros(visibility.triangle.size, np.float32)
     triangle[at], depth[at] = visibility.triangle.reshape(-1)[at], visibility.inverse_depth.reshape(-1)[at]
     light = np.zeros((len(triangle), 4), np.float32)
     shape = visibility.triangle.shape
-    seen = Visibility(triangle.reshape(shape), depth.reshape(shape))
-    shade_all(mirror, below, view, seen, triangle, depth, light, NO_SPLIT)
+    seen = Visibility(triangle.reshape(shape), depth.reshape(shape), reached=visibility.reached)
+    shade_all(mirror, below, seen, triangle, depth, light, NO_SPLIT)
     sky = np.ones_like(light)
     sky[at] = 0  # read only here
-    sky_behind(view, baked.surrounding, sky)
+    sky_behind(view_of(baked, below), baked.surrounding, sky)
     return _Mirrored(np.minimum(light[at, :3], BRIGHTEST), light[at, 3:], sky[at, :3], depth[at])
 
 
@@ -95,7 +106,15 @@ def _below(camera: Camera, plane: float) -> Camera:
     """The mirror image of a camera in a level plane: it sees things at the places of their mirror images."""
     turned = camera.R * np.array([1.0, 1.0, -1.0])
     center = camera.center * np.array([1.0, 1.0, -1.0]) + np.array([0.0, 0.0, 2 * plane])
-    return Camera(camera.intrinsics, turned, -turned @ center)
+    return Camera(camera.intrinsics, turned, -turned @ center, camera.rows and _rows_below(camera.rows, plane))
+
+
+def _rows_below(rows: RowPoses, plane: float) -> RowPoses:
+    """The mirror image of the poses of rows."""
+    flip = np.array([1.0, 1.0, -1.0])
+    turned = rows.rotation * flip
+    centers = centers_of(rows) * flip + np.array([0.0, 0.0, 2 * plane])
+    return RowPoses(turned, -product(turned, centers[..., None])[..., 0], rows.moving)
 
 
 def blurred(image: Float32, at: NDArray[np.intp], camera: Camera, reach: tuple[int, int]) -> Float32:

@@ -68,13 +68,13 @@ def mirror_in_panes(
         return
     panes = _panes(baked, baked.bounce_scene, visibility, left_out)
     triangle, depth = visibility.triangle.reshape(-1), visibility.inverse_depth.reshape(-1)
-    view, light = view_of(baked, camera), (baked.surrounding, baked.occlusion, baked.bounces)
+    view, light = view_of(baked, camera, triangle=triangle), (baked.surrounding, baked.occlusion, baked.bounces)
     borders = (FINE_SHARP, FINE_BLURRED) if baked.is_fine else (SHARP, BLURRED)
     for start in range(0, len(panes), SOME):
         at = panes[start : start + SOME]
         gloss = np.empty((len(at), kernels_split.GLOSS), np.float32)
         kernels_split.gloss(view, baked.surfaces, baked.textures, baked.floor, *light, at, triangle, depth, gloss)
-        away = np.ones(len(at)) if len(view.shifts) else 1 / depth[at]
+        away = np.ones(len(at)) if view.is_parallel else 1 / depth[at]
         width = (view.pixel * view.scale * away).astype(np.float32)
         if baked.is_fine:
             toward, normals = _facing(view, gloss)
@@ -91,7 +91,7 @@ def mirror_in_panes(
 
 def _facing(view: PictureRays, gloss: Float32) -> tuple[Float32, Float32]:
     """Directions towards the viewer, and normals, (n, 3) each; gloss (n, 13): see `kernels_split.gloss`."""
-    toward = np.tile(-view.rotation[2], (len(gloss), 1)) if len(view.shifts) else view.eye - gloss[:, 7:10]
+    toward = np.tile(-view.rotation[2], (len(gloss), 1)) if view.is_parallel else view.eye - gloss[:, 7:10]
     toward /= np.sqrt((toward * toward).sum(axis=1, keepdims=True))
     normals = toward + gloss[:, 10:13]
     return toward, normals / np.maximum(np.sqrt((normals * normals).sum(axis=1, keepdims=True)), np.float32(1e-6))

@@ -126,7 +126,8 @@ def locate(view, start, count, slots, depth, b, own):
             b[U(PX) + i] += shift[0]
             b[U(PY) + i] += shift[1]
             b[U(PZ) + i] += shift[2]
-            b[U(PIXEL) + i] = view.scale * view.pixel
+            if view.is_parallel:
+                b[U(PIXEL) + i] = view.scale * view.pixel
 
 
 @lanewise

@@ -368,6 +368,19 @@ def brighten_lines(pixels, means, width, radiance):
             radiance[p, c] = means[i, c] + (radiance[p, c] - means[i, c]) * shares[i]
 
 
+@njit
+def aim_rows(at, row, which, turns, shifts, rays, begin):
+    """Fill rays (S, 3) float32 with turns[which, row] (x, y, 1) for positions `at` (S, 2), and begin with shifts[which, row].
+
+    turns (M, H, 3, 3) and shifts (M, H, 3) are float64.
+    """
+    for i in range(U(at.shape[0])):
+        m, r, x, y = U(which[i]), U(row[i]), at[i, U(0)], at[i, U(1)]
+        for k in range(U(3)):
+            rays[i, k] = turns[m, r, k, U(0)] * x + turns[m, r, k, U(1)] * y + turns[m, r, k, U(2)]
+            begin[i, k] = shifts[m, r, k]
+
+
 @inner
 def _brightest(color):
     return max(color[U(0)], color[U(1)], color[U(2)])

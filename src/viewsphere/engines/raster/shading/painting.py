@@ -23,9 +23,11 @@ from viewsphere.engines.raster.shadows.shadow_maps import Lights
 from viewsphere.engines.raster.sky.environment import Surrounding, sky_behind
 from viewsphere.geometry.camera import inverse_camera_matrix
 from viewsphere.model.sensors.camera import Camera
+from viewsphere.model.sensors.rolling import RowPoses
 from viewsphere.model.weather import Fog
 from viewsphere.rendering.weather.fog import Air
 from viewsphere.truth.raster.geometry import Geometry
+from viewsphere.truth.raster.rolling import owners_of, ways_of_rows
 from viewsphere.truth.raster.visibility import Visibility, lens_rays
 
 _NO_RAYS = np.zeros((0, 3), np.float32)
@@ -92,12 +94,11 @@ def paint(
     empty, is filled with the parts of this light, (H * W, 6 or 9) float32 as in `kernels_split`; it must be 0 before.
     """
     baked.rows.write_seen(camera, visibility, baked.geometry)
-    view = view_of(baked, camera)
     triangle, depth = visibility.triangle.reshape(-1), visibility.inverse_depth.reshape(-1)
     air = None if fog is None else Air.for_camera(fog, camera, is_outdoors=is_outdoors)
-    stack = shade_all(baked, camera, view, visibility, triangle, depth, radiance, split, air=air, more=more)
+    stack = shade_all(baked, camera, visibility, triangle, depth, radiance, split, air=air, more=more)
     if has_sky:
-        _lay_sky(view, baked.surrounding, radiance, air)
+        _lay_sky(view_of(baked, camera), baked.surrounding, radiance, air)
     if not antialias:
         return
     behind = differs_behind(visibility, stack, baked.owner, baked.surfaces.normals, radiance)
@@ -112,8 +113,8 @@ def paint(
 def materials(baked: Baked, camera: Camera, visibility: Visibility) -> Float32:
     """Roughness and metallic at a camera's pixel centres, (H * W, 2) float32; 0 for no surface and for a shadow catcher."""
     baked.rows.write_seen(camera, visibility, baked.geometry)
-    view, out = view_of(baked, camera), np.zeros((visibility.triangle.size, 2), np.float32)
     triangle, depth = visibility.triangle.reshape(-1), visibility.inverse_depth.reshape(-1)
+    view, out = view_of(baked, camera, triangle=triangle), np.zeros((visibility.triangle.size, 2), np.float32)
     is_floor = baked.kind[triangle] == kernels_paint.FLOOR
     for is_ground, shown in ((False, (triangle >= 0) & ~is_floor), (True, is_floor)):
         slots = np.flatnonzero(shown).astype(np.int32)
@@ -151,13 +152,12 @@ def _smooth(
     kernels_paint.own_samples(rows, like, samples.position, *shown, places, triangle, inverse, is_other)
     rays = samples.rays.reshape(-1, 4, 3)[rows].reshape(-1, 3) if len(samples.rays) else samples.rays
     own = Samples(samples.pixels[rows], places, rays, triangle, inverse)
-    view = view_of(baked, camera, own)
     colors, parts = np.empty((count, 4), np.float32), np.zeros((count if len(split) else 0, split.shape[1]), np.float32)
     air = None if fog is None else Air.for_camera(fog, camera, _rays(camera, own), is_outdoors, own.position)
-    shade_all(baked, camera, view, visibility, own.triangle, own.inverse_depth, colors, parts, own, air)
+    shade_all(baked, camera, visibility, own.triangle, own.inverse_depth, colors, parts, own, air)
     if has_sky:
         colors[is_other, 3] = 1  # the sky need not be looked up for these
-        _lay_sky(view, baked.surrounding, colors, air)
+        _lay_sky(view_of(baked, camera, own), baked.surrounding, colors, air)
     if len(split):
         kernels_split.average_split(samples.pixels, like, colors, radiance, parts, split)
     glints, means = kernels_paint.average_samples(samples.pixels, like, colors, radiance)
@@ -167,7 +167,6 @@ def _smooth(
 def shade_all(
     baked: Baked,
     camera: Camera,
-    view: PictureRays,
     visibility: Visibility,
     triangle: Int32,
     depth: Float32,
@@ -182,6 +181,7 @@ def shade_all(
     """
     solid, ground = np.empty((2, len(triangle)), np.int32)
     materials = baked.surfaces.material, np.zeros(len(baked.surfaces.looks) + 1, np.uint64)
+    view = view_of(baked, camera, samples, triangle)
     solids, grounds = kernels_paint.sorted_samples(triangle, baked.kind, *materials, radiance, solid, ground)
     _shade_some(baked, view, solid[:solids], False, triangle, depth, radiance, split)
     _shade_some(baked, view, ground[:grounds], True, triangle, depth, radiance, split)
@@ -200,6 +200,7 @@ def shade_all(
             reached[layer.slot] = layer.inverse_depth
         behind, behind_depth = triangle.copy(), depth.copy()
         behind[layer.slot], behind_depth[layer.slot] = layer.triangle, layer.inverse_depth
+        view = view_of(baked, camera, samples, behind) if camera.rows is not None else view
         is_ground, is_bent = baked.kind[layer.triangle] == kernels_paint.FLOOR, first[layer.slot] == i
         for which in (False, True):
             slots = layer.slot[(is_ground == which) & ~is_bent]
@@ -273,16 +274,21 @@ def _shade_some(
         kernels_split.split(*given, split)
 
 
-def view_of(baked: Baked, camera: Camera, samples: Samples | None = None) -> PictureRays:
-    """The rays of a camera's pixel centres, or of these samples."""
+def view_of(baked: Baked, camera: Camera, samples: Samples | None = None, triangle: Int32 | None = None) -> PictureRays:
+    """The rays of a camera's pixel centres, or of these samples.
+
+    Under a rolling shutter they lead to the triangles (S,) that they meet, where these are at the instant.
+    """
     rays, places, shifts = _NO_RAYS, _NO_PLACES, _NO_RAYS
+    if camera.rows is not None:
+        rays, shifts = _rays_of_rows(baked, camera, camera.rows, samples, triangle)
     table = lens_rays(camera)
     if camera.lens.is_parallel:
         shifts = _shifts(baked, camera, samples)
         rays = np.tile(np.array([0, 0, 1], np.float32), (len(shifts), 1))
     if table is not None:
         rays = (table if samples is None else samples.rays).astype(np.float32).reshape(-1, 3)
-    if samples is not None and table is None:
+    if samples is not None and table is None and camera.rows is None:
         places = samples.position
     return PictureRays(
         ((camera.center - baked.origin) / baked.unit).astype(np.float32),
@@ -294,7 +300,32 @@ def view_of(baked: Baked, camera: Camera, samples: Samples | None = None) -> Pic
         np.float32(1 / baked.unit),
         places,
         shifts,
+        camera.lens.is_parallel,
     )
+
+
+def _rays_of_rows(
+    baked: Baked, camera: Camera, rows: RowPoses, samples: Samples | None, triangle: Int32 | None
+) -> tuple[Float32, Float32]:
+    """Rays (S, 3) in the camera's axes at the instant, and from the eye to where they begin, (S, 3) in the stage's axes.
+
+    A thing that moves is moved back to where it is at the instant, together with the rays that meet it.
+    """
+    geometry, width = baked.geometry, camera.width
+    there = [i for i in rows.moving if i < len(geometry.poses)]
+    turns, shifts = ways_of_rows(camera, rows, {i: geometry.poses[i] for i in there})
+    slot = np.zeros(len(geometry.poses) + 2, np.int64)
+    slot[there] = np.arange(1, len(there) + 1)
+    if samples is None:
+        row, column = np.divmod(np.arange(width * camera.height), width)
+        at = np.stack([column, row], axis=1) + 0.5
+    else:
+        row, at = np.repeat(samples.pixels // width, 4), samples.position.astype(np.float64)
+    of_triangle = np.append(slot[owners_of(geometry)], 0)  # the last one is that of the sky
+    which = np.zeros(len(at), np.int64) if triangle is None else of_triangle[triangle]
+    out, begin = np.empty((2, len(at), 3), np.float32)
+    kernels_paint.aim_rows(at, row, which, turns, (shifts / baked.unit), out, begin)
+    return out, begin
 
 
 def _shifts(baked: Baked, camera: Camera, samples: Samples | None) -> Float32:

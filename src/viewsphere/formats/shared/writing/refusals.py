@@ -87,6 +87,13 @@ def central(scope: Scope) -> Iterator[str]:
             yield f"expected cameras whose rays pass through one centre; found {lens.lens.name} of {name}"
 
 
+def global_shutter(scope: Scope) -> Iterator[str]:
+    """Reasons to refuse, for a format with one pose for all rows of a picture."""
+    for name, lens in lenses(scope):
+        if lens.rolling is not None:
+            yield f"expected cameras with one pose for all rows of a picture; found the rolling shutter of {name}"
+
+
 def pinhole(scope: Scope) -> Iterator[str]:
     """Reasons to refuse, for a format without lens distortion."""
     for name, lens in lenses(scope):
