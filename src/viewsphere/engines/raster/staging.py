@@ -23,6 +23,7 @@ from viewsphere.engines.raster.reflections.wet_ground import mirror_in_water
 from viewsphere.engines.raster.shading.painting import NO_SPLIT, Baked, materials, paint
 from viewsphere.engines.raster.shadows.thing_occlusion import TargetShades
 from viewsphere.engines.shared.arranged import Arranged, Arrangements
+from viewsphere.engines.shared.metering import Meter
 from viewsphere.engines.shared.passes import shading_of
 from viewsphere.errors import RecipeError
 from viewsphere.model.channel import LIGHT_PASSES, MATERIAL_PASSES, lacks_background, painted_together
@@ -152,7 +153,23 @@ class RasterStage:
         shape, focus = (camera.height, camera.width, 4), np.array(self.shot.instants[instant].focus)
         owner = self.at(instant).triangle_object
         seen = partial(seen_by, camera, focus, visibility.inverse_depth, visibility.triangle, owner)
-        return pictures(names, radiance.reshape(shape), background, finish, seen)
+        metered = None
+        if self._meter.follows(instant, sensor):
+            metered = partial(self._meter.reading, instant, sensor, partial(self._glance, shows_sky(finish.background)))
+        return pictures(names, radiance.reshape(shape), background, finish, seen, metered)
+
+    def _glance(self, has_sky: bool, instant: int, camera: Camera) -> Float32:
+        """The light (H, W, 4) that a camera sees at an instant, without motion blur and weather that falls."""
+        self._baked.clear()  # packed data is overwritten
+        arranged = self.arrangements.aside(instant)
+        baked = bake(self._pack(arranged), self.shot.scene, self.options, self._shades, self._halls)
+        light = np.empty((camera.height * camera.width, 4), np.float32)
+        self._paint_one(baked, camera, rasterize(arranged.geometry, camera), has_sky, light)
+        return light.reshape(camera.height, camera.width, 4)
+
+    @cached_property
+    def _meter(self) -> Meter:
+        return Meter(self.shot)
 
     def _paint(
         self, instant: int, sensor: int, camera: Camera, visibility: Visibility, has_sky: bool, radiance: Float32

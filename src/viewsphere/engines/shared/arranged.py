@@ -139,6 +139,14 @@ class Arrangements:
             del self._known[next(iter(self._known))]
         return known
 
+    def aside(self, instant: int) -> Arranged:
+        """The things at an instant, without a place among the latest ones. The geometry is valid until the next call of this
+        method or of `during`.
+        """
+        things = self.shot.things_at(instant)
+        meshes = self._meshes(things)
+        return self._arranged(things, meshes, meshes, self.ring.passing(things, meshes, self.floor))
+
     def during(self, instant: int, moment: float) -> Arranged:
         """The things a moment after an instant (as in `Sweep`) during the exposure. The geometry is valid until the next call
         of this method.

@@ -7,6 +7,7 @@ noise, Gaussian noise of the electronics, a linear response, a converter. Exposu
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from typing import Annotated, Literal
 
@@ -27,6 +28,9 @@ GREY = 1e-3
 
 SINGULAR = 1e-3
 """Least determinant of a colour matrix, whose inverse gives the sensor's colours."""
+
+READINGS = 7
+"""Readings that automatic settings follow: all but exp(-3.5), 3 %, of an exponential memory."""
 
 STEPS = 64
 """Radii at which the polynomial of the vignetting is checked."""
@@ -170,6 +174,23 @@ class MountedImager(Imager):
         """The longest automatic exposure, seconds."""
         longest = 1 / 30 if self.longest is None else self.longest
         return longest if self.fps is None else min(longest, 1 / self.fps)
+
+    def metering(self, instant: int) -> dict[int, float]:
+        """The numbers of the instants of a sequence whose light sets an instant's exposure, each with its weight; empty if the
+        picture's own light does.
+
+        They are multiples of half the adaptation's time, up to now, and weigh less the older they are. The light before the
+        first instant is that of the first.
+        """
+        frames = 0.0 if self.fps is None else self.adaptation * self.fps
+        if not frames or not self.is_metered:
+            return {}
+        step = max(1, round(frames / 2))
+        weights: dict[int, float] = {}
+        for number in range(READINGS):
+            at = instant - instant % step - number * step
+            weights[max(at, 0)] = weights.get(max(at, 0), 0.0) + math.exp((at - instant) / frames)
+        return weights
 
 
 def _determinant(m: Matrix3) -> float:

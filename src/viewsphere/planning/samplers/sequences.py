@@ -22,6 +22,7 @@ from viewsphere.composing.viewpoints.sequence_poses import SequencePoses
 from viewsphere.errors import RecipeError
 from viewsphere.labels import label_named
 from viewsphere.model.annotations.tracks import Tracks
+from viewsphere.model.channel import FINISHED
 from viewsphere.model.instant import Instant
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.scene import Floor, Matrix4
@@ -171,7 +172,7 @@ def _instant(context: SamplingContext, own: SequenceState, subject: str, pose: i
 
 
 def _needed(context: SamplingContext, taken: Set[int]) -> set[int]:
-    """The further instants that the labels of the taken ones need."""
+    """The further instants that the labels of the taken ones need, and their imager's automatic exposure."""
     names = {name for sensor in context.rig.sensors for name in sensor.kept_channels(context.recipe.channels)}
     names.update(context.recipe.annotations)
     known = (label for name in names if (label := label_named(name)))
@@ -179,6 +180,9 @@ def _needed(context: SamplingContext, taken: Set[int]) -> set[int]:
     offsets |= {-1, 1} if any(sensor.lidar and sensor.lidar.sweep for sensor in context.rig.sensors) else set()
     count = time_of(context).count
     compared = {number + offset for number in taken for offset in offsets if 0 <= number + offset < count}
+    for sensor in context.rig.sensors:
+        if sensor.imager is not None and not names.isdisjoint(FINISHED):
+            compared.update(*map(sensor.imager.metering, taken))
     return compared if context.tracks is None else compared | set(context.tracks.at)
 
 

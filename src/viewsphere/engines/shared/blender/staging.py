@@ -25,6 +25,7 @@ from viewsphere.engines.shared.blender.options import AnyOptions, options_of
 from viewsphere.engines.shared.blender.requests import Request, kinds_of, materials_request, members_of, scene_request, staged
 from viewsphere.engines.shared.blender.scripts import script_request
 from viewsphere.engines.shared.blender.texels import Kind, Levels
+from viewsphere.engines.shared.metering import Meter
 from viewsphere.engines.shared.passes import shading_of
 from viewsphere.errors import BlenderDied, BlenderError, ModelError, RecipeError, UserError
 from viewsphere.geometry.lenses import BlenderLens
@@ -37,7 +38,7 @@ from viewsphere.rendering.finish import pictures
 from viewsphere.rendering.seen import seen_by
 from viewsphere.rendering.weather.falling import fall_in
 from viewsphere.truth.raster.geometry import Geometry
-from viewsphere.truth.raster.visibility import Visibility
+from viewsphere.truth.raster.visibility import Visibility, rasterize
 
 _SHARP = {"pixel_filter_type": "GAUSSIAN", "filter_width": 0.01}
 """Settings of Cycles that make it sample only the middles of pixels."""
@@ -235,7 +236,22 @@ class CyclesStage:
         fall_in(self.shot.scene, rendered["picture"], camera, seconds, visibility.inverse_depth)
         focus, owner = np.array(self.shot.instants[instant].focus), arranged.geometry.triangle_object
         seen = partial(seen_by, camera, focus, visibility.inverse_depth, visibility.triangle, owner)
-        return rendered | pictures(names, rendered["picture"], background, finish, seen)
+        metered = None
+        if self._meter.follows(instant, sensor):
+            metered = partial(self._meter.reading, instant, sensor, partial(self._glance, is_open))
+        return rendered | pictures(names, rendered["picture"], background, finish, seen, metered)
+
+    def _glance(self, is_open: bool, instant: int, camera: Camera) -> Float32:
+        """The light (H, W, 4) that a camera sees at an instant, without motion blur, fog and weather that falls."""
+        now = self.arrangements.aside(instant)
+        arranged = Arrangement(self.shot, now.things, now.meshes, now.geometry, self.options, self.keeper)
+        still = self.shot.model_copy(update={"shutter": 0.0, "exposures": ()})
+        sharp = Sweeping(still, instant, 0, not self.options.uses_opengl)
+        return arranged.painted(camera, is_open, rasterize(now.geometry, camera), sharp)["picture"]
+
+    @cached_property
+    def _meter(self) -> Meter:
+        return Meter(self.shot)
 
     def _sweeping(self, instant: int, sensor: int) -> Sweeping:
         return Sweeping(self.shot, instant, sensor, not self.options.uses_opengl)
