@@ -35,7 +35,7 @@ def test_the_shipped_effects_state_what_rules_them_out():
     specs = [plugins.load(EffectSpec, name) for name in plugins.shipped("effects")]
     pinholes = {"depth_of_field", "edge_highlight"}
     assert {spec.name for spec in specs if spec.needs_pinhole} == pinholes
-    seams = pinholes | {"motion_blur", "blur", "chromatic_aberration", "vignetting"}
+    seams = pinholes | {"chromatic_aberration", "vignetting"}
     assert {spec.name for spec in specs if spec.shows_seam} == seams
 
 

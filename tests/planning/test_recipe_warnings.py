@@ -177,3 +177,15 @@ def test_warnings_name_the_line(tmp_path):
     )
     (said,) = plan(Recipe.load(file)).warnings
     assert said.startswith(f"{file}:6: scene.view.exposure: ")
+
+
+@pytest.mark.parametrize(("focal", "is_told"), [(20, True), (60, False)])
+def test_a_lens_that_shows_little_of_its_picture_is_said(focal, is_told):
+    """This fisheye shows angles up to 90 degrees: a circle of 20 x pi / 2 pixels is 0.2 of the picture."""
+    lens = {"model": "fisheye", "coefficients": [-4 / (3 * math.pi**2), 0, 0, 0]}  # its radius is greatest at 90 degrees
+    found = warnings({}, camera={"size": [120, 120], "focal_px": focal, "distortion": lens})
+    told = [text for text in found if "shows nothing in" in text]
+    assert bool(told) == is_told
+    rig = {"sensors": {"a": {}, "b": {"focal_px": focal, "distortion": lens, "size": [120, 120]}}}
+    told = [text for text in warnings({}, rig=rig) if text.startswith("rig: sensor b: the lens shows nothing in")]
+    assert bool(told) == is_told

@@ -13,6 +13,7 @@ from pydantic import ValidationError
 from viewsphere import plugins
 from viewsphere.codecs.srgb import linear
 from viewsphere.errors import UserError
+from viewsphere.geometry.lenses import lens_parameters
 from viewsphere.model.scene import Background, Effects, Finish, Smoother, ViewTransform
 from viewsphere.model.sensors.camera import Intrinsics
 from viewsphere.plugins.effect import EffectSpec
@@ -67,6 +68,26 @@ def moments(plane: np.ndarray) -> tuple[float, float, float, float, float]:
     return total, x, y, float((plane * (X - x) ** 2).sum() / total), float((plane * (Y - y) ** 2).sum() / total)
 
 
+AROUND = LENS.model_copy(update={"fx": W / math.tau, "fy": W / math.tau, "distortion": lens_parameters("equirectangular")})
+
+
+@pytest.mark.parametrize("effects", [Effects(blur=1.0), Effects(motion_blur=1.0, motion_angle_deg=25.0)])
+def test_blurs_continue_across_the_seam_of_a_full_turn(effects):
+    """A turned camera sees a turned blur, and light at the seam lands at the other side."""
+    known = Seen(*(getattr(seen(), name) for name in ("inverse_depth", "targets")), AROUND, 5.0)
+    picture = noise_picture()
+    whole = apply_effects(picture, effects, known)
+    for turn in (1, 37, W // 2):
+        turned = apply_effects(np.roll(picture, turn, axis=1), effects, known)
+        assert np.array_equal(turned, np.roll(whole, turn, axis=1))
+    dot = np.zeros((H, W, 3), np.float32)
+    dot[H // 2, 0] = 1
+    spread = apply_effects(dot, effects, known)[..., 0]
+    assert spread.sum() == pytest.approx(1, abs=1e-5) and spread[:, W // 2 :].sum() > 0.3
+    flat = apply_effects(dot, effects, seen())[..., 0]
+    assert flat[:, W // 2 :].sum() == 0
+
+
 def test_strength_0_is_the_same_array():
     assert steps_of(Effects()) == steps_of(Effects(seed=3, focus=2.0, motion_angle_deg=45, blur=0.0)) == ([], [], [])
     before, after, coded = steps_of(Effects(jpeg=0.5))
@@ -117,14 +138,14 @@ def test_effects_apply_in_the_order_of_the_light_path():
     assert np.array_equal(together, picture)
 
 
-def test_only_effects_that_read_surfaces_compute_them():
+def test_only_effects_that_read_surfaces_or_the_lens_compute_them():
     def unasked() -> Seen:
         raise AssertionError
 
     for name, spec in SPECS.items():
         (step,) = chain(*steps_of(Effects(**{name: 0.5})))
         picture = to_bytes(noise_picture()) if spec.stage == "file" else noise_picture()
-        if name in ("edge_highlight", "depth_of_field", "vignetting", "chromatic_aberration"):
+        if spec.stage in ("objects", "lens"):
             with pytest.raises(AssertionError):
                 step(picture, unasked)
         else:

@@ -182,7 +182,7 @@ class Plan(Shown, SamplingContext):
             warnings += (
                 message.replace("scene", f"variations.{name}", 1) if name else message for message in unlit(recipe.scene)
             )
-        doubts = doubtful_views(self.recipe, self.pose_list, self.intrinsics)
+        doubts = doubtful_views(self.recipe, self.pose_list, self.rig)
         if self.blend is not None:
             warnings += self.blend.warnings
         warnings += left_out(self.recipe)

@@ -64,8 +64,8 @@ class EffectSpec(Spec):
     )
     shows_seam: bool = Field(
         default=False,
-        description="whether it spreads light between pixels, or grows from the picture's middle to its corners: pictures of a "
-        "full turn refuse it, as it would show the seam at their sides",
+        description="whether it spreads light between pixels without regard to `context.shows_full_turn`, or grows from the "
+        "picture's middle to its corners: pictures of a full turn refuse it, as it would show the seam at their sides",
     )
     needs_pinhole: bool = Field(
         default=False, description="whether it follows from a pinhole's distances; pictures with parallel rays refuse it"

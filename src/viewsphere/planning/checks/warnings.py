@@ -19,6 +19,7 @@ from viewsphere.composing.viewpoints.poses import Poses
 from viewsphere.geometry.camera import orbit_center
 from viewsphere.model.scene import Sun
 from viewsphere.model.sensors.camera import Intrinsics
+from viewsphere.model.sensors.rig import Rig, Sensor
 from viewsphere.recipe.draws import alternatives, component, span
 from viewsphere.recipe.models import Dimensions, Length, ModelEntry
 from viewsphere.recipe.recipe import Recipe
@@ -38,6 +39,12 @@ DARK, BRIGHT = 2.0**-10, 16.0
 
 DRAWS = 20
 """Number of random poses that are drawn for a mean."""
+
+GRID = 32
+"""Columns and rows of the pixels whose rays are tried."""
+
+BLACK = 0.5
+"""Share of the picture without rays that triggers a warning: the circle of a round fisheye leaves 0.21 of a square."""
 
 MOSTLY = 2 / 3
 """Share of the picture covered by ground that triggers a warning; a level camera has half of the picture below the horizon."""
@@ -60,11 +67,31 @@ def unlit(scene: SceneEntry) -> Iterator[str]:
     yield from _hidden_by_exposure(scene)
 
 
-def doubtful_views(recipe: Recipe, views: Poses, lens: Intrinsics) -> Iterator[str]:
-    """Yield warnings about viewpoints from which models are out of view or too small, or the background is hidden."""
+def doubtful_views(recipe: Recipe, views: Poses, rig: Rig) -> Iterator[str]:
+    """Yield warnings about lenses that show little, and about viewpoints of the first sensor from which models are out of view
+    or too small, or the background is hidden.
+    """
+    lens = rig.sensors[0].intrinsics
+    for sensor in rig.sensors:
+        yield from _mostly_black(sensor, "camera" if len(rig.sensors) == 1 else f"rig: sensor {sensor.name}")
     yield from _out_of_view(recipe, views, lens)
     yield from _hidden_background(recipe.scene, views, lens)
     yield from _too_small(recipe, views, lens)
+
+
+def _mostly_black(sensor: Sensor, where: str) -> Iterator[str]:
+    """A warning if most of the picture is outside of what the lens shows, by rays of a grid of pixels."""
+    lens = sensor.intrinsics
+    if lens.lens.is_straight or lens.lens.is_scan:
+        return
+    across, down = (np.linspace(0, size, GRID + 1)[:-1] + size / (2 * GRID) for size in (lens.width, lens.height))
+    rays = lens.lens.rays(np.stack(np.meshgrid(across, down), axis=-1)).directions
+    black = float(np.isnan(rays).any(axis=-1).mean())
+    if black > BLACK:
+        yield (
+            f"{where}: the lens shows nothing in {100 * black:.0f} % of the picture, which is black there: set a larger focal "
+            "length or a smaller size, or see whether the coefficients are those of this size"
+        )
 
 
 def _no_light(scene: SceneEntry) -> Iterator[str]:

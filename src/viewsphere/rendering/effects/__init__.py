@@ -48,6 +48,11 @@ class EffectContext:
         return self._seen()
 
     @property
+    def shows_full_turn(self) -> bool:
+        """Return whether the last column of the picture lies beside its first one."""
+        return self.seen.intrinsics.lens.period is not None
+
+    @property
     def seed(self) -> int:
         """The seed of the noise of one sensor's frame, which all noisy effects share: make a generator of it and of the
         effect's name.

@@ -22,9 +22,9 @@ class _Blur(Frozen):
     blur: Portion = Field(default=0.0, description="defocus, as a Gaussian")
 
 
-def _apply(picture: NDArray[np.float32], options: _Blur, _context: EffectContext) -> NDArray[np.float32]:
-    """The picture blurred by a Gaussian, in linear light; the sum of the light is kept."""
-    return spread_both_ways(picture, gaussian(options.blur * SIGMA * picture.shape[1]))
+def _apply(picture: NDArray[np.float32], options: _Blur, context: EffectContext) -> NDArray[np.float32]:
+    """The picture blurred by a Gaussian, in linear light, across the seam of a full turn; the sum of the light is kept."""
+    return spread_both_ways(picture, gaussian(options.blur * SIGMA * picture.shape[1]), context.shows_full_turn)
 
 
 EFFECT = EffectSpec(
@@ -34,6 +34,5 @@ EFFECT = EffectSpec(
     stage="lens",
     order=30,
     apply=_apply,
-    shows_seam=True,
     record=1,
 )

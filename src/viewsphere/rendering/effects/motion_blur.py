@@ -27,9 +27,10 @@ class _MotionBlur(Frozen):
     motion_angle_deg: Number = Field(default=0.0, description="direction of the motion blur: counter-clockwise from the right")
 
 
-def _apply(picture: Float32, options: _MotionBlur, _context: EffectContext) -> Float32:
-    """The mean of the picture along a straight streak."""
-    return spread(picture, streak(options.motion_blur * STREAK * picture.shape[1], options.motion_angle_deg))
+def _apply(picture: Float32, options: _MotionBlur, context: EffectContext) -> Float32:
+    """The mean of the picture along a straight streak, across the seam of a full turn."""
+    kernel = streak(options.motion_blur * STREAK * picture.shape[1], options.motion_angle_deg)
+    return spread(picture, kernel, context.shows_full_turn)
 
 
 def streak(length: float, angle_deg: float) -> Float32:
@@ -56,6 +57,5 @@ EFFECT = EffectSpec(
     order=20,
     apply=_apply,
     shows_motion=True,
-    shows_seam=True,
     record=2,
 )
