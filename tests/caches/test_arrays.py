@@ -3,6 +3,8 @@
 import json
 import os
 import pickle
+import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -137,3 +139,24 @@ def test_pipes_devices_and_folders_are_refused(tmp_path):
     for name in ("link", "pipe", "folder"):
         with pytest.raises(FileError):
             read_arrays(tmp_path / name)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="/proc, and files that are mapped without being open")
+@pytest.mark.parametrize("is_mapped", [True, False])
+def test_a_mapped_file_is_not_held_open_and_changes_stay_here(is_mapped, tmp_path, monkeypatch):
+    if not is_mapped:
+        monkeypatch.setattr(module, "map_over", lambda *_: False)
+    file, values = tmp_path / "a", np.arange(module.MAPPED_BYTES, dtype=np.uint32)
+    write_arrays(file, None, {"values": values})
+
+    def count():
+        return len(list(Path("/proc/self/fd").iterdir()))
+
+    before = count()
+    held = [read_arrays(file).arrays["values"] for _ in range(20)]
+    assert count() == before
+    assert (str(file) in Path("/proc/self/maps").read_text()) == is_mapped
+    held[0][:] = 7
+    file.unlink()
+    for other in held[1:]:
+        np.testing.assert_array_equal(other, values)

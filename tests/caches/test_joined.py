@@ -100,7 +100,7 @@ def test_a_file_that_changes_while_it_is_mapped_does_not_matter(tmp_path, monkey
 
     monkeypatch.setattr(module, "_mappable_bytes", then_changed)
     if change == "failing":
-        monkeypatch.setattr(module, "_system_map", lambda: lambda *_: None)
+        monkeypatch.setattr(module, "map_over", lambda *_: False)
     filled([5, part, 3, stored(tmp_path, "b", LARGE)])
 
 

@@ -11,7 +11,7 @@ from pycocotools.cocoeval import COCOeval
 from cube_dataset import MESHES, make
 from viewsphere.errors import UserError
 from viewsphere.formats.coco import FORMAT
-from viewsphere.formats.coco.categories import CATEGORY_IDS, Options, category_ids, official_ids
+from viewsphere.formats.coco.categories import CATEGORY_IDS, Options, _official_ids, category_ids
 from viewsphere.geometry.mask import encode_rle
 from viewsphere.recipe.formats import FormatEntry
 from viewsphere.run.exports.exporting import write
@@ -56,13 +56,13 @@ def test_the_80_categories_of_coco():
 @pytest.mark.parametrize("name", ["hair drier", "hair_drier", "Hair-Drier", "hairdrier", "hairdryer", "hair dryer"])
 def test_categories_keep_coco_ids_however_spelled(name):
     categories = (Category(1, "gizmo", ""), Category(2, name, ""), Category(3, "hair drier", ""))
-    assert official_ids(categories) == {1: 91, 2: 89, 3: 93}
+    assert _official_ids(categories) == {1: 91, 2: 89, 3: 93}
 
 
 def test_the_zoos_furniture_has_cocos_ids():
     names = ("sofa", "bed", "television", "refrigerator")
     categories = [Category(i, name, "") for i, name in enumerate(names, 1)]
-    assert list(official_ids(categories).values()) == [63, 65, 72, 82]
+    assert list(_official_ids(categories).values()) == [63, 65, 72, 82]
 
 
 def test_detections_rebuilt_from_the_stored_maps_score_one(exported):

@@ -166,16 +166,16 @@ def test_changed_fields_are_found(stills, rle, tmp_path, change, told):
 
 def test_pycocotools_finds_moved_points(stills, rle, tmp_path):
     """The proof by another reader, by itself."""
-    from viewsphere.formats.coco.cross_check import compare_with_pycocotools
+    from viewsphere.formats.coco.cross_check import _compare_with_pycocotools
 
     folder = shutil.copytree(rle, tmp_path / "coco")
     options, file = Options(segmentation="rle"), folder / "annotations" / "instances_train.json"
-    assert not list(compare_with_pycocotools(stills, file, "train", range(len(stills)), options))
+    assert not list(_compare_with_pycocotools(stills, file, "train", range(len(stills)), options))
     value = json.loads(file.read_text())
     for annotation in value["annotations"]:
         annotation["keypoints"] = [c + 50 * (i % 3 == 0) for i, c in enumerate(annotation["keypoints"])]
     file.write_text(json.dumps(value))
-    remarks = compare_with_pycocotools(stills, file, "train", range(len(stills)), options)
+    remarks = _compare_with_pycocotools(stills, file, "train", range(len(stills)), options)
     assert any("keypoints: expected AP 1.0" in message for _, message in remarks)
 
 

@@ -1,4 +1,7 @@
 import math
+import mmap
+import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -8,6 +11,7 @@ from viewsphere.assets.mesh import Image, Material, Texture
 from viewsphere.labels import observe
 from viewsphere.truth.raster.alpha_masks import NEVER, SURFACE
 from viewsphere.truth.raster.geometry import moved
+from viewsphere.truth.raster.sparse import zeros
 from viewsphere.truth.raster.visibility import rasterize
 
 QUAD = [[-1, 0, -1], [1, 0, -1], [1, 0, 1], [-1, 0, 1]]
@@ -242,3 +246,16 @@ def test_instances_hold_no_labels_that_nothing_reads():
     assert np.array_equal(geometry.triangle_part, np.tile(mesh.triangle_part + 1, 3))
     assert set(vars(geometry.labels)) == {*held, "part"}
     assert moved(geometry, {}).triangle_part is geometry.triangle_part
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="/proc")
+def test_large_arrays_of_zeros_take_memory_only_where_they_are_written():
+    def resident():
+        return int(Path("/proc/self/statm").read_text().split()[1]) * mmap.PAGESIZE
+
+    before = resident()
+    ids = zeros(1 << 24, np.int32)
+    assert not ids.any()
+    ids[: 1 << 10] = 5
+    assert resident() - before < ids.nbytes / 2  # with room for the mask of `any`
+    assert ids[: 1 << 10].sum() == ids.sum(dtype=np.int64) == 5 << 10

@@ -11,6 +11,7 @@ Nothing in a file is executed: arrays hold numbers, and their places are checked
 
 from __future__ import annotations
 
+import ctypes
 import json
 import math
 import mmap
@@ -33,13 +34,15 @@ from viewsphere.files import open_file, read_text
 LOCAL = frozenset({"bcachefs", "btrfs", "ext2", "ext3", "ext4", "f2fs", "overlay", "tmpfs", "xfs", "zfs"})
 """Types of file systems, as in proc_mounts(5), whose files only this machine changes."""
 
+_MAP_FIXED = 0x10  # sys/mman.h of Linux; Python's mmap has no such flag
+
 MOUNTS = Path("/proc/self/mounts")
 
 MAGIC = b"VSA1"
-MAPPED_BYTES = 1 << 20
-"""Size in bytes from which a file is mapped; such files hold three quarters of the bytes of a town's models. Each mapping holds
-an open file, and a process may have 1,024 of them. Truncating a mapped file in place ends the processes that map it; viewsphere
-itself only replaces and deletes files.
+MAPPED_BYTES = 1 << 16 if sys.platform == "linux" else 1 << 20
+"""Size in bytes from which a file is mapped. On Linux, files of at least 64 kB hold 98 % of the bytes of a town's models.
+Elsewhere each mapping holds an open file, and a process may have 1,024 of them. Truncating a mapped file in place ends the
+processes that map it; viewsphere itself only replaces and deletes files.
 """
 
 LINE = 64
@@ -144,8 +147,29 @@ def _mapped(stream: BufferedReader, file: Path) -> memoryview:
     """
     size = os.fstat(stream.fileno()).st_size
     if size >= MAPPED_BYTES and is_local(file):
-        return memoryview(mmap.mmap(stream.fileno(), size, access=mmap.ACCESS_COPY))
+        if sys.platform != "linux":
+            return memoryview(mmap.mmap(stream.fileno(), size, access=mmap.ACCESS_COPY))
+        pages = mmap.mmap(-1, size, flags=mmap.MAP_PRIVATE | mmap.MAP_ANONYMOUS)
+        if map_over(np.frombuffer(pages, np.uint8).ctypes.data, size, stream.fileno()):
+            return memoryview(pages)
     return memoryview(bytearray(stream.read()))
+
+
+def map_over(address: int, size: int, descriptor: int) -> bool:
+    """Map a file, copied on write, over pages at an address that a mapping of this process holds, and return whether this
+    worked. Such a mapping holds no open file, unlike those of Python's `mmap`. Linux only.
+    """
+    protection, flags = mmap.PROT_READ | mmap.PROT_WRITE, mmap.MAP_PRIVATE | _MAP_FIXED
+    return _system_map()(address, size, protection, flags, descriptor, 0) == address
+
+
+@cache
+def _system_map() -> Any:
+    """mmap(2), which can map a file at a given address."""
+    function = ctypes.CDLL(None).mmap
+    function.restype = ctypes.c_void_p
+    function.argtypes = [ctypes.c_void_p, ctypes.c_size_t, ctypes.c_int, ctypes.c_int, ctypes.c_int, ctypes.c_long]
+    return function
 
 
 def is_local(file: Path) -> bool:

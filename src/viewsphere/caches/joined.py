@@ -2,23 +2,19 @@
 
 from __future__ import annotations
 
-import ctypes
 import mmap
 import os
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cache
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from viewsphere.caches.arrays import MAPPED_BYTES, is_local
+from viewsphere.caches.arrays import MAPPED_BYTES, is_local, map_over
 from viewsphere.files import open_file
-
-_MAP_FIXED = 0x10  # sys/mman.h of Linux; Python's mmap has no such flag
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,18 +82,8 @@ def _map(part: Stored, size: int, place: NDArray[Any]) -> bool:
             if os.fstat(stream.fileno()).st_size != size:
                 return False
             address = place.ctypes.data + part.values.nbytes - size
-            protection, flags = mmap.PROT_READ | mmap.PROT_WRITE, mmap.MAP_PRIVATE | _MAP_FIXED
-            if _system_map()(address, size, protection, flags, stream.fileno(), 0) != address:
+            if not map_over(address, size, stream.fileno()):
                 return False
     except OSError:
         return False
     return np.array_equal(place, part.values.reshape(-1))
-
-
-@cache
-def _system_map() -> Any:
-    """mmap(2), which can map a file at a given address."""
-    function = ctypes.CDLL(None).mmap
-    function.restype = ctypes.c_void_p
-    function.argtypes = [ctypes.c_void_p, ctypes.c_size_t, ctypes.c_int, ctypes.c_int, ctypes.c_int, ctypes.c_long]
-    return function

@@ -70,7 +70,7 @@ def category_ids(dataset: Dataset, options: Options) -> dict[int, int]:
         return {category.id: number for number, category in enumerate(dataset.categories, 1)}
     if keeps_ids(dataset):
         return {category.id: category.id for category in dataset.categories}
-    return official_ids(dataset.categories)
+    return _official_ids(dataset.categories)
 
 
 def keeps_ids(dataset: Dataset) -> bool:
@@ -78,7 +78,7 @@ def keeps_ids(dataset: Dataset) -> bool:
     return any(part.frames and not part.settings for part in dataset.plan.parts)
 
 
-def official_ids(categories: tuple[Category, ...]) -> dict[int, int]:
+def _official_ids(categories: tuple[Category, ...]) -> dict[int, int]:
     """COCO's id of each category, or a free one.
 
     If two categories have the same COCO name, the first gets COCO's id. Free ids follow the recipe's order.
@@ -94,7 +94,7 @@ def notes(categories: Sequence[Category], options: Options) -> Iterator[str]:
     """Yield notes on unexpected ids: categories that COCO lacks, or that share a single COCO category."""
     if options.category_ids == "contiguous":
         return
-    for category, number in zip(categories, official_ids(tuple(categories)).values(), strict=True):
+    for category, number in zip(categories, _official_ids(tuple(categories)).values(), strict=True):
         if number >= _FIRST_FREE_ID:
             why = (
                 "COCO does not have" if _plain(category.name) not in _official() else "COCO has once, for another category here"

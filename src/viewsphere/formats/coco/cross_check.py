@@ -62,7 +62,7 @@ class _Truth:
     points: list[float]  # x, y, v of each of its category's points
 
 
-def compare_with_pycocotools(
+def _compare_with_pycocotools(
     dataset: Dataset, file: Path, split: str, sampled: Collection[int], options: Options
 ) -> Iterator[Remark]:
     """Yield masks, areas and boxes that differ from the instance maps, and any AP below 1 for detections made from the maps
@@ -184,7 +184,7 @@ def verify(dataset: Dataset, folder: Path, sampled: Collection[int], options: Op
         for name in names:
             yield from check_json(scratch_folder / name, folder / "annotations" / name, OPENED, _frame)
         for split in dataset.splits:
-            yield from compare_with_pycocotools(dataset, folder / "annotations" / file_name(split), split, sampled, options)
+            yield from _compare_with_pycocotools(dataset, folder / "annotations" / file_name(split), split, sampled, options)
 
 
 def _expected(dataset: Dataset, append: Callable[[Entry], None], options: Options) -> Iterator[Expected]:

@@ -15,7 +15,7 @@ from viewsphere.assets.mesh import Mesh
 from viewsphere.model.scene import Floor
 from viewsphere.model.thing import Thing
 from viewsphere.truth.raster.alpha_masks import ENDLESS, NEVER, NO_CUTOUTS, AlphaMasks, alpha_masks_of, stack_cutouts
-from viewsphere.truth.raster.sparse import Spare
+from viewsphere.truth.raster.sparse import Spare, zeros
 from viewsphere.truth.raster.triangle_labels import TriangleLabels, ground_classes, scenery_classes
 
 BACKGROUND = 0
@@ -28,7 +28,7 @@ GROUND_REACH = 1000.0
 """Distance from the middle to the ground's corners, in scene sizes: as far as renderers without endless planes must draw it."""
 
 OF_VERTICES = ("coordinates", "is_used")
-STACKED = (*OF_VERTICES, "triangle_object", "poses", "bounds", "ground")
+STACKED = (*OF_VERTICES, "poses", "bounds", "ground")
 """Arrays of a geometry that are concatenated from its parts."""
 
 Corner = NDArray[np.float64]
@@ -377,7 +377,7 @@ def _placed(things: tuple[Thing, ...], meshes: tuple[Mesh, ...], label_alpha: fl
         coordinates=np.concatenate([np.empty((0, 3), np.float32), *(mesh.vertices for mesh in meshes)], dtype=np.float32),
         ground=np.empty((0, 3)),
         triangles=_offset_triangles([mesh.triangles for mesh in meshes], vertex_start),
-        triangle_object=np.repeat(np.array([thing.id for thing in things], np.int32), np.diff(triangle_start)),
+        triangle_object=_objects(triangle_start, objects, triangle_start[-1]),
         triangle_cutout=rows,
         alpha_masks=alpha_masks,
         single_sided=_offset([_single_sided(*pair) for pair in zip(things, meshes, strict=True)], triangle_start),
@@ -407,15 +407,18 @@ def _stacked(parts: Sequence[Geometry]) -> Geometry:
     first_triangles = (0, *accumulate(len(part.triangles) for part in parts))
     alpha_masks, rows = stack_cutouts([(part.alpha_masks, part.triangle_cutout) for part in parts])
     arrays = {name: np.concatenate([getattr(part, name) for part in parts]) for name in STACKED}
+    triangle_start = (0, *accumulate(b - a for part in parts for a, b in pairwise(part.triangle_start)))
+    objects = sum(part.object_count for part in parts)
     return Geometry(
         **arrays,
+        triangle_object=_objects(triangle_start, objects, first_triangles[-1]),
         triangles=_offset_triangles([part.triangles for part in parts], firsts),
         triangle_cutout=rows,
         alpha_masks=alpha_masks,
         single_sided=_offset([part.single_sided for part in parts], first_triangles),
         vertex_start=(0, *accumulate(b - a for part in parts for a, b in pairwise(part.vertex_start))),
-        triangle_start=(0, *accumulate(b - a for part in parts for a, b in pairwise(part.triangle_start))),
-        object_count=sum(part.object_count for part in parts),
+        triangle_start=triangle_start,
+        object_count=objects,
         ground_z=parts[-1].ground_z,
         meshes=tuple(mesh for part in parts for mesh in part.meshes),
         labels=TriangleLabels(
@@ -426,6 +429,14 @@ def _stacked(parts: Sequence[Geometry]) -> Geometry:
         facing=_Facing(),
         spare=Spare(),
     )
+
+
+def _objects(triangle_start: Sequence[int], objects: int, count: int) -> NDArray[np.int32]:
+    """The object of each of `count` triangles: objects come first, with ids from 1, and 0 is scenery and ground."""
+    ids = zeros(count, np.int32)
+    for i in range(objects):
+        ids[triangle_start[i] : triangle_start[i + 1]] = i + 1
+    return ids
 
 
 def _single_sided(thing: Thing, mesh: Mesh) -> NDArray[np.int32]:

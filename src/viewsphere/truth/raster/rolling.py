@@ -135,7 +135,7 @@ def owners_of(geometry: Geometry) -> NDArray[np.int32]:
     return _owners(geometry.triangle_start, len(geometry.triangles))
 
 
-@lru_cache(maxsize=4)
+@lru_cache(maxsize=2)  # with the ground and without; those of a town take 13 MB
 def _owners(triangle_start: tuple[int, ...], triangles: int) -> NDArray[np.int32]:
     counts = np.diff([*triangle_start, triangles])
     return np.repeat(np.arange(len(counts), dtype=np.int32), counts)

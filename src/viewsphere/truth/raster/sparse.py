@@ -14,6 +14,9 @@ from numpy.typing import NDArray
 LEAST = 1 << 25
 """Minimum size in bytes of an array with pages of its own; smaller ones use the heap, whose memory is already mapped."""
 
+LEAST_ZEROS = 1 << 22
+"""Minimum size in bytes of an array of zeros with pages of its own: the objects of the triangles of a town take 13 MB."""
+
 MOST = 16
 """Number of successive arrays that reuse the same pages; then pages of things no longer in sight are released."""
 
@@ -28,6 +31,23 @@ def sparse(shape: tuple[int, ...], dtype: type[Kind]) -> NDArray[Kind]:
     megabyte, a few of them in the picture, that is nearly the whole array. Systems without such pages behave like this anyway.
     """
     return Spare().array(shape, dtype)
+
+
+def zeros(count: int, dtype: type[Kind]) -> NDArray[Kind]:
+    """An array of zeros that, if it is large, uses memory only for the pages that are written. numpy's own are written as soon
+    as the heap has room for them.
+    """
+    size = count * np.dtype(dtype).itemsize
+    if size < LEAST_ZEROS or not hasattr(mmap, "MADV_NOHUGEPAGE"):
+        return np.zeros(count, dtype)
+    return np.frombuffer(_pages(size), dtype, count)
+
+
+def _pages(size: int) -> mmap.mmap:
+    """New pages, which are zero and take no memory before they are written."""
+    pages = mmap.mmap(-1, size, flags=mmap.MAP_PRIVATE | mmap.MAP_ANONYMOUS)
+    pages.madvise(mmap.MADV_NOHUGEPAGE)
+    return pages
 
 
 @dataclass(eq=False)
@@ -52,8 +72,7 @@ class Spare:
             return np.empty(shape, dtype)
         pages = self._free.pop() if self._free else None
         if pages is None or pages.uses == MOST or len(pages.memory) < size:
-            pages = _Pages(mmap.mmap(-1, size, flags=mmap.MAP_PRIVATE | mmap.MAP_ANONYMOUS))
-            pages.memory.madvise(mmap.MADV_NOHUGEPAGE)
+            pages = _Pages(_pages(size))
         pages.uses += 1
         whole = np.frombuffer(pages.memory, dtype, count)  # lives as long as any view of it
         weakref.finalize(whole, self._free.append, pages).atexit = False

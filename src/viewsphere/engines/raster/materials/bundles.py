@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from viewsphere.assets.mesh import WRAPS, Image, Material, Texture
 from viewsphere.caches import cache_of
-from viewsphere.caches.arrays import MAPPED_BYTES, Content
+from viewsphere.caches.arrays import Content
 from viewsphere.caches.entries import SUFFIX, cached
 from viewsphere.caches.joined import Stored, joined
 from viewsphere.codecs.srgb import linear
@@ -37,6 +37,8 @@ SHARPEST = 4096
 """Longest side, in texels, at which a texture is kept; larger textures are reduced by a whole factor."""
 MOST_WORDS = 1 << 28
 """Maximum number of words (uint16) in the bundles of a stage, half a gigabyte; above it, the largest bundles are reduced."""
+STORED_BYTES = 1 << 20
+"""Bytes from which a content of scenery is stored in the cache; smaller ones are built faster than they are found."""
 KEPT_BYTES = 1 << 27
 """Bytes of texels that are cached for the next stage, which often shows the same model."""
 
@@ -220,7 +222,7 @@ class _Kept:
 
     def _stored(self, content: _Content, known: Words | None) -> Stored | int:
         """The content's levels in the cache, or their number of words if they are not to be cached."""
-        if not content.is_scenery or content.words * 2 < MAPPED_BYTES:
+        if not content.is_scenery or content.words * 2 < STORED_BYTES:
             return content.words
         images = [(self._digest(image), image.pixels.shape, name) for image, name in content.uses]
         digest = digest_of(("texels", images, content.weighted, content.factor))
