@@ -443,7 +443,6 @@ def draw_rays(q, order, triangles, cutout, alpha_masks, see_through, unit, table
         surface = (t, cutout[ut], see_through[ut], (nx, ny, nz, det), bounds)
         n = (nx / det, ny / det, nz / det)
         leaf, pixels = LEAF // side, (box[0] * side, box[1] * side, (box[2] + 1) * side, (box[3] + 1) * side)
-        # A second call of `_cast_all` would keep LLVM from inlining it, which takes ten times as long.
         for i in range(1 if narrow else touched(edges, n, sliver, levels, boxes, pixels, least, most, leaves)):
             if not narrow:
                 x, y = np.int64(leaves[i, 0]) // side, np.int64(leaves[i, 1]) // side
@@ -452,7 +451,7 @@ def draw_rays(q, order, triangles, cutout, alpha_masks, see_through, unit, table
             _cast_all(surface, edges, sliver, found, count, points, alpha_masks, triangles, solid, fragments)
 
 
-@inner
+@inner(forceinline=True)  # a call would copy all arguments to the stack: ten times the time
 def _cast_all(surface, edges, sliver, found, count, points, alpha_masks, triangles, solid, fragments):
     """Cast the rays of these pixels at a triangle."""
     grid, rays, _, _, _ = points
@@ -550,34 +549,46 @@ def _pixels(low, high, reach, size):
     return first, math.floor(max(min(high - (reach[0] - EPSILON), size - 1.0), -1.0))
 
 
-@inner
+@inner(forceinline=True)  # a call would copy all arguments to the stack: twice the time
 def _cast_parallel(surface, found, count, grid, offsets, alpha_masks, triangles, solid, fragments):
     """Draw a surface at the points of these pixels."""
-    t, cutout, is_see_through, checked, edges, slope, bounds = surface
+    t, _, _, checked, edges, slope, bounds = surface
     nearest, seen, farthest, _ = solid
     plain = not checked and nearest.shape[1] == FOUR
     for j in range(count):
         row, column = U(found[j] >> np.uint32(16)), U(found[j] & np.uint32(0xFFFF))
-        p, least, which = U(grid[row, column]), CLOSED, np.intp(15)
+        k, least, which, x, y = U(grid[row, column]), CLOSED, np.intp(15), float(np.int64(column)), float(np.int64(row))
         if plain:
-            which = np.intp(covered(edges, slope, bounds, float(np.int64(column)), float(np.int64(row)), offsets, nearest, p))
+            which = np.intp(covered(edges, slope, bounds, x, y, offsets, nearest, k))
             if which == 0:
                 continue
-        for m in range(U(nearest.shape[1])):
-            px, py, at = column + offsets[U(0), m], row + offsets[U(1), m], (p, m)
-            if which >> m & 1:
-                inside, e0, e1, e2 = (True, 0.0, 0.0, 0.0) if plain and cutout < 0 else covers(edges, checked, px, py)
-                z = depth_at(slope, bounds, px, py) if inside else 0.0
-                inverse = 1.0 / z
-                if is_see_through and z > 0.0:
-                    if inverse * (1.0 + TIE) >= nearest[at] and hits_surface(alpha_masks, cutout, e0, e1, e2):
-                        _insert(t, inverse, at, triangles, fragments)
-                elif (
-                    z > 0.0 and _is_before(inverse, t, nearest[at], seen[at]) and hits_surface(alpha_masks, cutout, e0, e1, e2)
-                ):
-                    nearest[at], seen[at] = inverse, t
-            least = min(least, level(nearest[at]))
+        for i in range(U(nearest.shape[1])):
+            if which >> i & 1:
+                px, py = x + offsets[U(0), i], y + offsets[U(1), i]
+                z = depth_at(slope, bounds, px, py)
+                if plain and z > 0.0:
+                    inverse = 1.0 / z
+                    if _is_before(inverse, t, nearest[k, i], seen[k, i]):
+                        nearest[k, i], seen[k, i] = inverse, t
+                elif z > 0.0:
+                    _cast_checked(surface, px, py, 1.0 / z, (k, i), alpha_masks, triangles, solid, fragments)
+            least = min(least, level(nearest[k, i]))
         farthest[row, column] = max(farthest[row, column], least)
+
+
+@inner
+def _cast_checked(surface, px, py, inverse, p, alpha_masks, triangles, solid, fragments):
+    """Draw a cut-out, a sliver or a see-through surface at a point, where its 1/z is `inverse`."""
+    t, cutout, is_see_through, checked, edges, _, _ = surface
+    nearest, seen = solid[0], solid[1]
+    inside, e0, e1, e2 = covers(edges, checked, px, py)
+    if not inside:
+        return
+    if is_see_through:
+        if inverse * (1.0 + TIE) >= nearest[p] and hits_surface(alpha_masks, cutout, e0, e1, e2):
+            _insert(t, inverse, p, triangles, fragments)
+    elif _is_before(inverse, t, nearest[p], seen[p]) and hits_surface(alpha_masks, cutout, e0, e1, e2):
+        nearest[p], seen[p] = inverse, t
 
 
 @njit(_nrt=True)
