@@ -10,7 +10,7 @@ from viewsphere.assets.mesh import Mesh
 from viewsphere.assets.normalise import normalise, rotation, sorted_by_part
 from viewsphere.assets.primitive import FileFacts
 from viewsphere.errors import ModelError
-from viewsphere.model.model_spec import ModelSpec
+from viewsphere.model.model_spec import ModelSpec, ScaledTo
 
 AXES = ("+x", "-x", "+y", "-y", "+z", "-z")
 VECTORS = dict(zip(AXES, [s * e for e in np.eye(3) for s in (1, -1)], strict=True))
@@ -99,6 +99,15 @@ def test_scale_to_a_length_and_to_the_real_size(cube):
 def test_absurd_sizes_say_what_was_found(cube, size):
     with pytest.raises(ModelError, match=rf"found {size:.3g} m; set unit".replace("+", r"\+")):
         normalise(box((size, size, size), cube=cube), NATIVE, spec())
+
+
+MEASURES = {"width": 1, "length": 2, "height": 3, "longest": 3, "diagonal": 14**0.5}
+
+
+@pytest.mark.parametrize(("measure", "before"), MEASURES.items())
+def test_each_measure_of_the_box_can_be_scaled_to(cube, measure, before):
+    scaled = normalise(box((1, 2, 3), cube=cube), NATIVE, spec(scale=ScaledTo(measure=measure, metres=0.6)))
+    np.testing.assert_allclose(np.ptp(scaled.bounds, axis=0), np.array([1, 2, 3]) * 0.6 / before, rtol=1e-6)
 
 
 def test_a_flat_model_has_no_length_to_scale(cube):

@@ -3,8 +3,9 @@
 import pytest
 
 from viewsphere.errors import RecipeError
+from viewsphere.model.model_spec import ScaledTo
 from viewsphere.planning import models
-from viewsphere.planning.models import categories, count_models, left_out, model_specs
+from viewsphere.planning.models import Listing, categories, count_models, left_out, model_specs
 from viewsphere.recipe.recipe import Recipe
 from viewsphere_zoo import things
 
@@ -25,7 +26,7 @@ def build(tmp_path):
 
 
 def keys(recipe):
-    assert count_models(recipe) == len(model_specs(recipe))
+    assert count_models(Listing(recipe)) == len(model_specs(recipe))
     return [spec.key for spec in model_specs(recipe)]
 
 
@@ -148,7 +149,7 @@ def test_any_means_every_family_whose_members_are_things(build):
     assert [c.name for c in categories(build([{"source": "zoo:any"}]))] == [name.replace("_", " ") for name in known]
     named = build([{"source": "zoo:any", "count": 4, "category": "thing", "name": "clutter"}])
     assert [c.name for c in categories(named)] == ["thing"] and keys(named)[0] == "clutter_000"
-    assert count_models(build([{"source": ["zoo:any", "zoo:car"], "count": 4}])) == 8
+    assert count_models(Listing(build([{"source": ["zoo:any", "zoo:car"], "count": 4}]))) == 8
 
 
 def test_categories_count_from_one_in_order_of_appearance(build):
@@ -226,3 +227,19 @@ def test_folders_and_patterns_mean_usd_files_where_they_are_read_without_blender
     expected = ["a.obj", "b.usda", "c.USDZ"] if is_installed else ["a.obj"]
     for source in (".", "*"):
         assert sorted(file.name for file in models._matching(tmp_path, source, "models[0]")) == expected
+
+
+def test_a_scale_names_one_measure(tmp_path):
+    (tmp_path / "a.obj").touch()
+
+    def scale(value):
+        entry = {"source": "a.obj", "category": "a", "scale": value}
+        recipe = Recipe.model_validate({"models": [entry], "viewpoints": {"distance": 3}}, context={"folder": tmp_path})
+        return model_specs(recipe)[0].scale, recipe.model_dump(mode="json")["models"][0]["scale"]
+
+    assert scale({"length": 2}) == (2.0, {"length": 2.0})
+    assert scale({"height": 2}) == (ScaledTo(measure="height", metres=2), {"height": 2.0})
+    with pytest.raises(RecipeError, match=r"models\[0\].scale: expected one of length, .*; found length and height"):
+        scale({"length": 1, "height": 2})
+    with pytest.raises(RecipeError, match=r"models\[0\].scale: expected one of length, .*; found none"):
+        scale({})

@@ -12,13 +12,13 @@ from viewsphere.model.sensors.rig import Sensor
 from viewsphere.model.thing import Repaint
 from viewsphere.recipe.cameras.viewpoints import PoseList
 from viewsphere.recipe.draws import Distribution, Gaussian
-from viewsphere.recipe.models import ModelEntry
+from viewsphere.recipe.models import ModelEntry, ScaleEntry
 from viewsphere.recipe.world.scenery import CompanyEntry, PlaceEntry
 from viewsphere.recipe.world.surface import GroundEntry, MaterialEntry
 
 CLASSES = [
     *(Viewpoint, ModelSpec, Sensor, Repaint, Finish, Ground, Patch, Distribution, Gaussian),
-    *(ModelEntry, PlaceEntry, CompanyEntry, GroundEntry, MaterialEntry, PoseList),
+    *(ModelEntry, ScaleEntry, PlaceEntry, CompanyEntry, GroundEntry, MaterialEntry, PoseList),
 ]
 
 

@@ -12,7 +12,7 @@ from viewsphere.assets.primitive import FileFacts, Float, face_normals, unit_nor
 from viewsphere.errors import ModelError
 from viewsphere.geometry.rotation import rigid, transform
 from viewsphere.limits import limits
-from viewsphere.model.model_spec import Axis, ModelSpec, Size
+from viewsphere.model.model_spec import Axis, Measure, ModelSpec, ScaledTo, Size
 from viewsphere.model.scene import Matrix4
 
 PROPORTION_TOLERANCE = 0.1
@@ -142,13 +142,31 @@ def _factor(size: Float, facts: FileFacts, spec: ModelSpec) -> tuple[float, tupl
         raise ModelError(f"{facts.path}: scale real_size needs the model's real_size (width, height, length in metres)")
     if scale == "as_is" or (scale == "real_size" and isinstance(real, str)):
         return unit, ()
-    wanted = real[2] if isinstance(scale, str) and isinstance(real, tuple) else float(scale)
-    if not (size[1] > 0 and wanted > 0):
-        raise ModelError(f"{facts.path}: cannot scale a length of {size[1]:g} to {wanted:g} m; check forward or use as_is")
-    factor = float(wanted / size[1])
+    goal = scale if isinstance(scale, ScaledTo) else ScaledTo(measure="length", metres=_real_length(scale, real))
+    found = _measured(size, goal.measure)
+    if not (found > 0 and goal.metres > 0):
+        raise ModelError(
+            f"{facts.path}: cannot scale a {goal.measure} of {found:g} to {goal.metres:g} m; check forward or use as_is"
+        )
+    factor = goal.metres / found
     if scale == "real_size" and isinstance(real, tuple):
         return factor, _proportion_warnings(size * factor, facts, real)
     return factor, ()
+
+
+def _real_length(scale: str | float, real: Size | str | None) -> float:
+    return real[2] if isinstance(scale, str) and isinstance(real, tuple) else float(scale)
+
+
+def _measured(size: Float, measure: Measure) -> float:
+    """A measure of a box of this width, length and height."""
+    match measure:
+        case "longest":
+            return float(size.max())
+        case "diagonal":
+            return float(np.linalg.norm(size))
+        case _:
+            return float(size[("width", "length", "height").index(measure)])
 
 
 def _proportion_warnings(size: Float, facts: FileFacts, real_size: Size) -> tuple[str, ...]:

@@ -15,6 +15,17 @@ Axis = Literal["+x", "-x", "+y", "-y", "+z", "-z"]
 Size = tuple[float, float, float]  # width along X, height along Z, length along Y, metres
 
 
+Measure = Literal["length", "width", "height", "longest", "diagonal"]
+"""A length of a model's box: along Y, X or Z, its longest side, or its diagonal."""
+
+
+class ScaledTo(Frozen):
+    """A measure that a model is scaled to, metres."""
+
+    measure: Measure
+    metres: float
+
+
 class Parts(Frozen):
     """The parts of a model to keep: those of the objects in `only` (None: all) except those in `without`.
 
@@ -47,7 +58,7 @@ class ModelSpec(OmitNone):
     forward: Axis | None = None
     unit: float | None = None  # metres in one unit of the file
     centring: Literal["box", "area", "floor", "as_is"] = "box"
-    scale: Literal["as_is", "real_size"] | float = "as_is"  # a number: metres from front to back
+    scale: Literal["as_is", "real_size"] | float | ScaledTo = "as_is"  # a number: metres from front to back
     real_size: Size | Literal["file"] | None = None  # "file": the size the file has, before any scaling
     confined: bool = True  # texture and buffer paths must be inside the model's folder
     rest: int | None = None  # frame of an animated file, which Blender then reads, if no time step is given

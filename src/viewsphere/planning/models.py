@@ -24,7 +24,7 @@ from viewsphere.composing.tables import Cells, table_rows
 from viewsphere.errors import ModelError, PluginError, RecipeError, UserError, each
 from viewsphere.limits import limits
 from viewsphere.model.fields.file_names import is_reserved
-from viewsphere.model.model_spec import ModelSpec, Size
+from viewsphere.model.model_spec import ModelSpec, ScaledTo, Size
 from viewsphere.plugins import checked
 from viewsphere.plugins.source import (
     Named,
@@ -37,7 +37,7 @@ from viewsphere.plugins.source import (
 )
 from viewsphere.printable import printable
 from viewsphere.recipe.draws import drawn
-from viewsphere.recipe.models import Dimensions, Length, ModelEntry, SizeTable, unit_metres
+from viewsphere.recipe.models import Dimensions, ModelEntry, ScaleEntry, SizeTable, unit_metres
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.store import Category
 from viewsphere.validation.errors import Nearest
@@ -69,13 +69,37 @@ class _Found:
         return self.facts is None
 
 
-def count_models(recipe: Recipe) -> int:
+Expanded = tuple[tuple[Named, tuple[SourceModel, ...]], ...]
+"""The names of an entry that sources expand, each with its single models."""
+
+
+class Listing:
+    """The models that a recipe's names of sources stand for, each name listed once: for sets of 50,000 models, that takes most
+    of the time of a plan.
+    """
+
+    def __init__(self, recipe: Recipe) -> None:
+        self.recipe = recipe
+        self._known: dict[int, Expanded] = {}
+
+    def of(self, index: int) -> Expanded:
+        """The names of an entry, each with all of its models; none for an entry of files. Raises RecipeError for an unknown
+        name.
+        """
+        if index not in self._known:
+            self._known[index] = tuple(_listed(self.recipe, index))
+        return self._known[index]
+
+
+def count_models(listing: Listing) -> int:
     """Return the number of models, without making their specifications.
     Raises RecipeError for missing files and unknown models of sources, of all entries together.
     """
 
+    recipe = listing.recipe
+
     def count(index: int) -> int:
-        names = _expanded(recipe, index)
+        names = _expanded(listing, index)
         if not names:
             return len(_files(recipe, index))
         single = len(_chosen(recipe, index, names))
@@ -92,14 +116,15 @@ def model_specs(recipe: Recipe) -> tuple[ModelSpec, ...]:
     return tuple(spec for spec, _ in numbered_specs(recipe))
 
 
-def numbered_specs(recipe: Recipe) -> tuple[tuple[ModelSpec, int], ...]:
-    """The same, each with the number of its entry.
+def numbered_specs(recipe: Recipe, listing: Listing | None = None) -> tuple[tuple[ModelSpec, int], ...]:
+    """The same, each with the number of its entry; `listing` is the recipe's.
 
     Raises RecipeError for files not found, models that a table of sizes lacks, and categories with two supercategories, each
     kind of all models together; and for two models of one key.
     """
-    models_of_entries = each(lambda i: tuple(_found(recipe, i)), range(len(recipe.models)))
-    ids = {c.name: c.id for c in categories(recipe)}
+    listing = listing or Listing(recipe)
+    models_of_entries = each(lambda i: tuple(_found(listing, i)), range(len(recipe.models)))
+    ids = {c.name: c.id for c in categories(recipe, listing)}
     table, hint = cache(_read_sizes), Nearest()
 
     def numbered(model: _Found) -> tuple[ModelSpec, int]:
@@ -175,13 +200,16 @@ def _check_file(entry: ModelEntry, found: _Found) -> None:
         )
 
 
-def categories(recipe: Recipe) -> tuple[Category, ...]:
-    """The categories in order of appearance, ids from 1; raises RecipeError for all with two supercategories."""
+def categories(recipe: Recipe, listing: Listing | None = None) -> tuple[Category, ...]:
+    """The categories in order of appearance, ids from 1; raises RecipeError for all with two supercategories. `listing` is the
+    recipe's.
+    """
+    listing = listing or Listing(recipe)
     result: dict[str, Category] = {}
 
     def add(i: int) -> None:
         entry = recipe.models[i]
-        for model in _single(recipe, i):
+        for model in _single(listing, i):
             name = _category(entry, model)
             category = result.setdefault(name, Category(len(result) + 1, name, entry.supercategory))
             if category.supercategory != entry.supercategory:
@@ -194,16 +222,12 @@ def categories(recipe: Recipe) -> tuple[Category, ...]:
     return tuple(result.values())
 
 
-Expanded = tuple[tuple[Named, tuple[SourceModel, ...]], ...]
-"""The names of an entry that sources expand, each with its single models."""
-
-
-def _expanded(recipe: Recipe, index: int) -> Expanded:
+def _expanded(listing: Listing, index: int) -> Expanded:
     """The names of an entry that sources expand, without models that cannot be used; none for an entry of files.
     Raises RecipeError for an unknown name, and for one without any usable model.
     """
     expanded: list[tuple[Named, tuple[SourceModel, ...]]] = []
-    for origin, models in _listed(recipe, index):
+    for origin, models in listing.of(index):
         usable = tuple(model for model in models if not model.fault)
         if models and not usable:
             raise RecipeError(
@@ -240,11 +264,11 @@ def _chosen(recipe: Recipe, index: int, names: Expanded) -> list[tuple[Named, So
     return [models[i] for i in sorted(drawn)]
 
 
-def _single(recipe: Recipe, index: int) -> Iterator[SourceModel | None]:
+def _single(listing: Listing, index: int) -> Iterator[SourceModel | None]:
     """All single models that an entry may have, as far as its category depends on them; None for those of files."""
-    if recipe.models[index].category:
+    if listing.recipe.models[index].category:
         return iter((None,))
-    return (model for _, models in _expanded(recipe, index) for model in models)
+    return (model for _, models in _expanded(listing, index) for model in models)
 
 
 def _count(recipe: Recipe, index: int) -> int:
@@ -260,11 +284,13 @@ def _count(recipe: Recipe, index: int) -> int:
     return count
 
 
-def _scale(recipe: Recipe, entry: ModelEntry, key: str) -> Literal["as_is", "real_size"] | float:
+def _scale(recipe: Recipe, entry: ModelEntry, key: str) -> Literal["as_is", "real_size"] | float | ScaledTo:
     """Return the scale setting of a model; a length is drawn separately for each model."""
-    if not isinstance(entry.scale, Length):
+    if not isinstance(entry.scale, ScaleEntry):
         return entry.scale
-    return drawn(entry.scale.length, lambda path: generator(recipe.lasting_seed, "models", "scale", key, *path))
+    measure, metres = entry.scale.goal
+    metres = drawn(metres, lambda path: generator(recipe.lasting_seed, "models", "scale", key, *path))
+    return metres if measure == "length" else ScaledTo(measure=measure, metres=metres)
 
 
 def _sidecar(recipe: Recipe, index: int) -> str | None:
@@ -286,10 +312,11 @@ def _category(entry: ModelEntry, model: SourceModel | None) -> str:
     return model.category or model.name.replace("_", " ")
 
 
-def _found(recipe: Recipe, index: int) -> Iterator[_Found]:
+def _found(listing: Listing, index: int) -> Iterator[_Found]:
+    recipe = listing.recipe
     entry = recipe.models[index]
     prefix = f"{entry.name}_" if entry.name else ""
-    names = _expanded(recipe, index)
+    names = _expanded(listing, index)
     for origin, model in _chosen(recipe, index, names):
         key = _short(_free(prefix + _as_key(model.key or model.name)))
         yield _Found(index, key, f"{origin.prefix}:{model.name}", facts=model)
@@ -335,18 +362,20 @@ def _files(recipe: Recipe, index: int) -> tuple[Path, ...]:
     return tuple(sorted(files, key=lambda f: f.as_posix()))
 
 
-def left_out(recipe: Recipe) -> Iterator[str]:
-    """A warning for each entry with models of a source that cannot be used, and for each entry whose folders and patterns hold
-    files that only Blender reads, and that no entry names.
-    """
-    for i in range(len(recipe.models)):
-        for origin, models in _listed(recipe, i):
+def unusable(listing: Listing) -> Iterator[str]:
+    """A warning for each name of a source with models that cannot be used."""
+    for i in range(len(listing.recipe.models)):
+        for origin, models in listing.of(i):
             if faulty := [model for model in models if model.fault]:
                 first = printable(faulty[0].key or faulty[0].name)
                 yield (
                     f"models[{i}].source: {origin.prefix}: {quantity(len(faulty), 'model')} of {len(models):,} left out, e.g. "
                     f"{first}: {faulty[0].fault}"
                 )
+
+
+def left_out(recipe: Recipe) -> Iterator[str]:
+    """A warning for each entry whose folders and patterns hold files that only Blender reads, and that no entry names."""
     taken = cache(lambda: {file for i, entry in enumerate(recipe.models) if not entry.names for file in _files(recipe, i)})
     for i, entry in enumerate(recipe.models):
         sources = () if entry.names else entry.source

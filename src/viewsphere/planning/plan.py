@@ -49,7 +49,7 @@ from viewsphere.planning.clips import with_clips
 from viewsphere.planning.credits import credits_of, unlicensed
 from viewsphere.planning.engine_digest import engine_options, script_digest
 from viewsphere.planning.imagers import check_imager
-from viewsphere.planning.models import categories, left_out, numbered_specs
+from viewsphere.planning.models import Listing, categories, left_out, numbered_specs, unusable
 from viewsphere.planning.rigs import rig_of, with_distances
 from viewsphere.planning.samplers import SamplingContext, Standing, lens
 from viewsphere.planning.splits import expected, quotas
@@ -79,11 +79,13 @@ class Plan(Shown, SamplingContext):
         categories: The categories of the models, in the order of their ids.
         shot_frames: Most frames of a shot, the unit of rendering and resuming.
         credits: The known credits, by the keys of models that the data set keeps.
+        unusable: A warning for each name of a source with models that cannot be used.
     """
 
     categories: tuple[Category, ...] = ()
     shot_frames: int = SHOT_FRAMES
     credits: Mapping[str, Credit] = field(default_factory=dict[str, Credit])  # known ones, by keys of models that are kept
+    unusable: tuple[str, ...] = ()
 
     @cached_property
     def sampler(self) -> SamplerSpec:
@@ -185,7 +187,7 @@ class Plan(Shown, SamplingContext):
         doubts = doubtful_views(self.recipe, self.pose_list, self.rig)
         if self.blend is not None:
             warnings += self.blend.warnings
-        warnings += left_out(self.recipe)
+        warnings += (*self.unusable, *left_out(self.recipe))
         return tuple(map(self.recipe.locate, (*self.recipe.warnings, *warnings, *doubts)))
 
     @property
@@ -442,8 +444,9 @@ def plan(recipe: Recipe | str | PathLike[str], shot_frames: int | None = None) -
         if rig is None:  # those of a rig are checked together with it
             check_lenses(recipe, Rig.single(own))
         check_fill(recipe, rig or Rig.single(own), views)
-        check_frames(recipe, views)
-        found = numbered_specs(recipe)
+        listing = Listing(recipe)
+        check_frames(recipe, views, listing)
+        found = numbered_specs(recipe, listing)
         numbered = tuple((spec, number) for spec, number in found if spec.category_id)
         distractors = tuple((spec, number) for spec, number in found if not spec.category_id)
         check_distractors(recipe)
@@ -465,7 +468,8 @@ def plan(recipe: Recipe | str | PathLike[str], shot_frames: int | None = None) -
             scene_pictures(recipe),
             sampler.subjects(recipe, specs),
             timings=timings,
-            categories=categories(recipe),
+            categories=categories(recipe, listing),
+            unusable=tuple(unusable(listing)),
             shot_frames=frames,
             own_rig=rig,
             entries=tuple(number for _, number in numbered),

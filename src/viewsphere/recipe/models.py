@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, get_args
 
 from pydantic import BeforeValidator, Discriminator, Field, Tag, model_validator
 
@@ -12,7 +12,7 @@ from viewsphere.model.credit import Attribution, Credit, Licence, SourceUrl
 from viewsphere.model.fields.frozen import Frozen
 from viewsphere.model.fields.numbers import Count, Positive
 from viewsphere.model.fields.omit_none import OmitNone
-from viewsphere.model.model_spec import Axis
+from viewsphere.model.model_spec import Axis, Measure
 from viewsphere.plugins import prefix_of
 from viewsphere.plugins.source import suggested
 from viewsphere.recipe.cameras.time import RATE, STEPS, Frames, Rate, Steps
@@ -58,10 +58,30 @@ class SizeTable(Frozen):
     unit: Unit = Field(default="m", description="unit of its numbers: m, cm, mm, in, ft or a number of metres")
 
 
-class Length(Frozen):
-    """A length to scale a model to."""
+class ScaleEntry(OmitNone):
+    """A measure of a model's box, and the metres to scale it to."""
 
-    length: Drawn[Positive] = Field(description="metres from front to back, a number, [low, high] or a distribution")
+    OMIT_IF_NONE = get_args(Measure)
+
+    length: Drawn[Positive] | None = Field(
+        default=None, description="metres from front to back, a number, [low, high] or a distribution"
+    )
+    width: Drawn[Positive] | None = Field(default=None, description="or metres from side to side")
+    height: Drawn[Positive] | None = Field(default=None, description="or metres from bottom to top")
+    longest: Drawn[Positive] | None = Field(default=None, description="or metres of the longest of these")
+    diagonal: Drawn[Positive] | None = Field(default=None, description="or metres of the box's diagonal")
+
+    @model_validator(mode="after")
+    def _check(self) -> ScaleEntry:
+        given = [name for name in self.OMIT_IF_NONE if getattr(self, name) is not None]
+        if len(given) != 1:
+            raise ValueError(f"expected one of {', '.join(self.OMIT_IF_NONE)}; found {' and '.join(given) or 'none'}")
+        return self
+
+    @property
+    def goal(self) -> tuple[Measure, Any]:
+        """The measure, and its metres or their distribution."""
+        return next((name, value) for name in get_args(Measure) if (value := getattr(self, name)) is not None)
 
 
 RealSize = Annotated[
@@ -76,11 +96,11 @@ RealSize = Annotated[
 ]
 
 Scale = Annotated[
-    Annotated[Length, Tag("mapping")] | Annotated[Literal["as_is", "real_size"], Tag("text")],
+    Annotated[ScaleEntry, Tag("mapping")] | Annotated[Literal["as_is", "real_size"], Tag("text")],
     Discriminator(
         shape_of,
         custom_error_type="scale",
-        custom_error_message="expected as_is, real_size or a mapping of length",
+        custom_error_message="expected as_is, real_size or a mapping of length, width, height, longest or diagonal",
     ),
 ]
 
@@ -142,7 +162,9 @@ class ModelEntry(OmitNone):
         "path, or {csv, unit}), or file: the file's size. The default for the zoo is file",
     )
     scale: Scale = Field(
-        default="as_is", description="as_is, real_size, or {length: 1.8}: length of the scaled model in metres"
+        default="as_is",
+        description="as_is, real_size, or {length: 1.8}: length of the scaled model in metres; or its width, height, longest "
+        "side or diagonal",
     )
     sidecar: Annotated[str, Field(min_length=1)] | None = Field(
         default=None,

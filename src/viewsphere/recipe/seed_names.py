@@ -9,13 +9,13 @@ from __future__ import annotations
 
 _UNCHANGED = """
     amount angle_deg aside at background bay begin below blend blur clouds color company count date daylight density
-    distance distractors drop effects enter exposure fit flip focal_mm focal_px fog fov_deg friction glow ground hdri
-    height high highest_hz horizon image jitter kerb keys kind lamps lane latitude leave length lights longitude mass
+    diagonal distance distractors drop effects enter exposure fit flip focal_mm focal_px fog fov_deg friction glow ground hdri
+    height high highest_hz horizon image jitter kerb keys kind lamps lane latitude leave length lights longest longitude mass
     material materials metallic moon most motion night normal_image objects off_center offset parked pattern pavement
     period phase_deg place planes points position principal_point puddles radius rain rate reach restitution
     rotation_deg roughness roughness_image scale side size sky smoother snow speed spin_deg spread strength sun target
     temperature_k texture tile time tint toward transform turbidity turn velocity view visibility walkers wet wind
-    windows zenith zoom
+    width windows zenith zoom
 """
 """Fields whose names equal their seed names."""
 

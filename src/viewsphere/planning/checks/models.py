@@ -19,7 +19,7 @@ from viewsphere.errors import RecipeError
 from viewsphere.labels import channels, is_channel, is_on_request, label_named, labels, on_request
 from viewsphere.model.channel import MATERIAL_PASSES, PASSES
 from viewsphere.model.model_spec import ModelSpec
-from viewsphere.planning.models import count_models
+from viewsphere.planning.models import Listing, count_models
 from viewsphere.plugins.engine import EngineSpec
 from viewsphere.plugins.format import FormatSpec
 from viewsphere.plugins.sampler import SamplerSpec
@@ -218,11 +218,11 @@ def _engine(recipe: Recipe) -> EngineSpec:
     return plugins.load(EngineSpec, recipe.engine.name)
 
 
-def check_frames(recipe: Recipe, views: Poses) -> None:
+def check_frames(recipe: Recipe, views: Poses, listing: Listing) -> None:
     """Check that models x poses do not exceed the limit, if the sampler renders their product."""
     if recipe.scenes is not None:
         return
-    models, count = count_models(recipe), math.prod(views.counts.values())
+    models, count = count_models(listing), math.prod(views.counts.values())
     if models * count > recipe.max_frames:
         factors = " x ".join(f"{n:,} {what}" for what, n in {"models": models, **views.counts}.items())
         raise RecipeError(

@@ -21,7 +21,7 @@ from viewsphere.model.scene import Sun
 from viewsphere.model.sensors.camera import Intrinsics
 from viewsphere.model.sensors.rig import Rig, Sensor
 from viewsphere.recipe.draws import alternatives, component, span
-from viewsphere.recipe.models import Dimensions, Length, ModelEntry
+from viewsphere.recipe.models import Dimensions, ModelEntry, ScaleEntry
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.recipe.world.light import DaylightSky, HdriSky, NightSky, SunEntry
 from viewsphere.recipe.world.scene import SceneEntry
@@ -202,9 +202,9 @@ def _below_horizon(elevation_deg: float, lens: Intrinsics) -> float:
 
 
 def _length(entry: ModelEntry) -> float | None:
-    """The longest side, metres, of an entry's models, from their dimensions or from the length to which they are scaled."""
-    if isinstance(entry.scale, Length):
-        return span(entry.scale.length)[0]
+    """The longest side, metres, of an entry's models, from their dimensions or from the measure to which they are scaled."""
+    if isinstance(entry.scale, ScaleEntry):
+        return span(entry.scale.goal[1])[0]
     size = entry.real_size if entry.scale == "real_size" else None
     return max(size.width, size.height, size.length) if isinstance(size, Dimensions) else None
 
