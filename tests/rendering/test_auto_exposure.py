@@ -102,3 +102,18 @@ def test_exposure_over_a_sequence_keeps_the_picture_near_its_key():
             assert Settings.of(imager, Reading.of(sample.rgb_linear)).seconds <= 0.1
             assert 60 < np.median(sample.rgb) < 180
     assert len(keys) == 48
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("blender")
+@pytest.mark.parametrize("engine", [{"name": "cycles", "samples": 4}, "workbench"])
+def test_blender_s_pictures_go_through_the_imager(engine):
+    views = {"azimuth": [30], "elevation": 20, "distance": 1.0}
+    camera = {"fov_deg": 40, "size": [64, 48], "imager": "webcam"}
+    same = {"viewpoints": views, "camera": camera, "channels": ["rgb", "bayer"], "formats": [], "engine": engine}
+    samples, again = (
+        list(render(small_recipe(time={"frames": 4, "fps": 10}, shot_frames=frames, **same))) for frames in (4, 2)
+    )
+    for sample, other in zip(samples, again, strict=True):
+        assert 300 < sample.bayer.mean() < 2500 and 60 < np.median(sample.rgb) < 200
+        assert np.array_equal(sample.bayer, other.bayer)

@@ -1,23 +1,29 @@
 """The imager: noise, mosaic, colours, optics and exposure in closed form; and the recipes that may have it."""
 
+import io
 import itertools
 import math
+import tarfile
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from small import small_recipe
-from viewsphere import Dataset, Recipe, generate, plan, render
+from viewsphere import Dataset, Recipe, generate, plan, plugins, render
 from viewsphere.check import check
 from viewsphere.codecs.srgb import encoded
-from viewsphere.errors import RecipeError
+from viewsphere.errors import RecipeError, UserError
 from viewsphere.model.sensors.camera import Intrinsics
 from viewsphere.model.sensors.imager import SUNLIT, MountedImager
+from viewsphere.plugins.format import FormatSpec
 from viewsphere.recipe.cameras.imager import PRESETS
+from viewsphere.recipe.formats import FormatEntry
 from viewsphere.rendering.imager.metering import KEY, Reading, Settings
 from viewsphere.rendering.imager.optics import through_lens
 from viewsphere.rendering.imager.sensor import developed, digital_numbers
 from viewsphere.rendering.view import bytes_of_words
+from viewsphere.run.opening import check_formats
 
 PATTERNS = ("rggb", "bggr", "grbg", "gbrg")
 QUIET = {"full_well": 1e9, "read_noise": 0.0, "bits": 16, "cos4": False}
@@ -410,3 +416,37 @@ def test_an_open_shutter_is_the_exposure():
     planned = plan(recipe_of("phone", time={"frames": 4, "fps": 20, "shutter": 0.25}))
     assert planned.rig.sensors[0].imager.exposure == pytest.approx(0.0125)
     assert plan(recipe_of("phone", time={"frames": 4, "fps": 50})).rig.sensors[0].imager.longest_exposure == 0.02
+
+
+def test_webdataset_and_huggingface_hold_the_mosaic(tmp_path):
+    parquet = pytest.importorskip("pyarrow.parquet")
+    recipe = recipe_of(channels=["rgb", "bayer"], formats=["webdataset", "huggingface"], splits={"train": 1.0})
+    generate(recipe, tmp_path / "out", workers=0)
+    mosaics = [sample.bayer for sample in Dataset(tmp_path / "out")]
+    names, rows = [], []
+    for file in sorted((tmp_path / "out" / "webdataset").rglob("*.tar")):
+        with tarfile.open(file) as archive:
+            names += [
+                (name, np.load(io.BytesIO(archive.extractfile(name).read())))
+                for name in archive.getnames()
+                if ".bayer." in name
+            ]
+    for file in sorted((tmp_path / "out" / "huggingface").rglob("*.parquet")):
+        rows += parquet.read_table(file, columns=["bayer"]).to_pylist()
+    assert len(names) == len(rows) == len(mosaics) == 4
+    for mosaic, (_, array), row in zip(mosaics, sorted(names), rows, strict=True):
+        assert array.dtype == np.uint16 and np.array_equal(array, mosaic)
+        assert np.array_equal(np.asarray(Image.open(io.BytesIO(row["bayer"]["bytes"]))), mosaic)
+
+
+@pytest.mark.parametrize("name", plugins.shipped("formats"))
+def test_formats_of_pictures_refuse_a_mosaic_alone_with_words(name):
+    spec, planned = plugins.load(FormatSpec, name), plan(recipe_of(channels=["bayer", "depth", "instances"]))
+    if spec.writer is None:
+        return
+    try:
+        check_formats(planned, [FormatEntry(name=name)], planned.recipe.channels)
+    except UserError as error:
+        assert "expected" in str(error) and "found" in str(error) and len(str(error).splitlines()) == 1
+    else:
+        assert "rgb" not in (spec.channels or ())
