@@ -249,7 +249,7 @@ def larger(camera: Camera, times: int) -> Camera:
     """The camera with the same picture at `times` the resolution in each direction."""
     lens = camera.intrinsics
     scaled = {name: times * getattr(lens, name) for name in ("width", "height", "fx", "fy", "cx", "cy", "skew")}
-    return Camera(lens.model_copy(update=scaled), camera.R, camera.t)
+    return Camera(lens.model_copy(update=scaled), camera.R, camera.t, camera.rows and camera.rows.repeated(times))
 
 
 def _average(fine: Float32, coarse: Float32) -> None:

@@ -42,3 +42,8 @@ class RowPoses:
     rotation: Float
     translation: Float
     moving: Mapping[int, Float]
+
+    def repeated(self, times: int) -> RowPoses:
+        """The poses of a picture with so many rows for each row."""
+        moving = {i: np.repeat(poses, times, axis=0) for i, poses in self.moving.items()}
+        return RowPoses(np.repeat(self.rotation, times, axis=0), np.repeat(self.translation, times, axis=0), moving)

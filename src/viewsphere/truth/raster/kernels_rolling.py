@@ -17,6 +17,8 @@ from viewsphere.truth.raster.kernels_place import there
 
 BAND = 16  # rows: with fewer, vertices are bounded more often; with more, more triangles are tested that no row touches
 SLACK = 1e-9  # share of a sum's parts by which an interval is widened: more than the rounding of its products
+STEADY = 0.9  # rows that a point may move by from one row to the next to be found by steps, which then converge
+STEPS = 40  # of them: 0.9 ** 40 of a picture is less than its rows
 NONE, ALL = 2**30, -(2**30)  # the first row of a vertex beyond the sides, and of one that may be beside the camera
 
 
@@ -96,45 +98,96 @@ def _bound_rows(middle, reach, x, y, z, samples, canvas, out, i):
     out[i, 3] = -math.ceil(min(max(u1 * samples - canvas[0] + 1.0, -far), far))
 
 
+@inner
+def _bound_vertex(world, i, v, middle, reach, canvas, out):
+    """Fill out[v] with the `_bound_rows` of a vertex of thing i, or of the ground."""
+    coordinates, ground, starts, poses = world[0], world[1], world[2], world[3]
+    if i == poses.shape[0]:
+        g = np.uintp(v - starts[i])
+        x, y, z = ground[g, 0], ground[g, 1], ground[g, 2]
+    else:
+        x, y, z = np.float64(coordinates[v, 0]), np.float64(coordinates[v, 1]), np.float64(coordinates[v, 2])
+    _bound_rows(middle, reach, x, y, z, canvas[0], (canvas[1], canvas[2]), out, v)
+
+
+@inner
+def _united(bounds, triangles, t, size, rows):
+    """The first and the last row, within `rows` (first and last), and the first and the last column, that a triangle may touch;
+    no row if it is beside the canvas.
+    """
+    i0, i1, i2 = np.uintp(triangles[t, 0]), np.uintp(triangles[t, 1]), np.uintp(triangles[t, 2])
+    ya, xa = min(bounds[i0, 0], bounds[i1, 0], bounds[i2, 0]), min(bounds[i0, 1], bounds[i1, 1], bounds[i2, 1])
+    yb, xb = -min(bounds[i0, 2], bounds[i1, 2], bounds[i2, 2]), -min(bounds[i0, 3], bounds[i1, 3], bounds[i2, 3])
+    if xa >= size[0] or xb < 0:
+        return 0, -1, 0, -1
+    return max(ya, rows[0]), min(yb, rows[1]), max(xa, 0), min(xb, size[0] - 1)
+
+
+@inner
+def _find_ranges(world, triangles, cutout, span, middle, reach, canvas, size, bounds, ranges, thing):
+    """Fill ranges (T, 2), the first and the last row of the canvas that each triangle of a thing may touch, and those of the
+    thing (2,); returns the number of their bands. Triangles that labels never see count, too: pictures may show them.
+    """
+    whole, total = (0, size[1] - 1), 0
+    thing[0], thing[1] = size[1], -1
+    for v in range(np.uintp(world[2][span[0]]), np.uintp(world[2][span[0] + 1])):
+        _bound_vertex(world, span[0], v, middle, reach, canvas, bounds)
+    for t in range(span[1], span[2]):
+        ya, yb, _, _ = (0, size[1] - 1, 0, 0) if cutout[t] < NEVER else _united(bounds, triangles, t, size, whole)
+        if ya <= yb:
+            thing[0], thing[1] = min(thing[0], ya), max(thing[1], yb)
+            total += yb // BAND - ya // BAND + 1
+        ranges[t, 0], ranges[t, 1] = ya, yb if ya <= yb else -1
+    return total
+
+
 @njit(_nrt=True)
-def list_active(world, triangles, cutout, spans, band, canvas, size, bounds, active):
-    """List the triangles that a band [first, stop) of the canvas's rows may touch, in their order, in active (n, 4): the
-    triangle, its thing, its first row and its last; returns their number.
+def list_active(world, triangles, cutout, spans, canvas, size, ends):
+    """The triangles that each band of the canvas's rows may touch, in their order, (n, 6) int32: the triangle, its thing, its
+    first row and its last, its first column and its last. Fills ends (bands,), the number of rows up to the end of each band.
 
     `world` holds coordinates (V, 3), ground (4, 3), starts (N + 2,) of the vertices of things and ground, poses (N, 4, 4) of
     things, slot (N,) int32, -1 or the thing's place in moving (M, H, 4, 4), and m (H, 3, 4), from the world to pixels.
     `spans` (n, 3) are things with their first triangle and the one after the last; `canvas` is the number of samples along a
-    pixel's side, and the canvas's first sample (x, y); `size` its width and height; bounds (V, 4) int32 is scratch.
+    pixel's side, and the canvas's first sample (x, y); `size` its width and height.
     """
-    coordinates, ground, starts, poses, _, _, m = world
-    samples, x0, y0 = canvas
-    rows = _row_of(band[0], y0, samples, m.shape[0]), _row_of(band[1] - 1, y0, samples, m.shape[0]) + 1
+    count, pictured = world[0].shape[0], world[6].shape[0]
     one, middle, reach = np.empty((3, 4)), np.empty((3, 4)), np.empty((3, 4))
-    count = 0
+    bounds, stamp, ranges = (
+        np.empty((count, 4), np.int32),
+        np.full(count, -1, np.int32),
+        np.empty((len(triangles), 2), np.int32),
+    )
+    total, things = 0, np.empty((spans.shape[0], 2), np.int32)  # the rows that each thing may touch
     for k in range(spans.shape[0]):
-        i, first, last = spans[k, 0], spans[k, 1], spans[k, 2]
-        is_ground = i == poses.shape[0]
-        _bound_matrix(world, i, rows, one, middle, reach)
-        for v in range(np.uintp(starts[i]), np.uintp(starts[i + 1])):
-            if is_ground:
-                g = np.uintp(v - starts[i])
-                _bound_rows(middle, reach, ground[g, 0], ground[g, 1], ground[g, 2], samples, (x0, y0), bounds, v)
-            else:
-                x, y, z = np.float64(coordinates[v, 0]), np.float64(coordinates[v, 1]), np.float64(coordinates[v, 2])
-                _bound_rows(middle, reach, x, y, z, samples, (x0, y0), bounds, v)
-        for t in range(first, last):
-            i0, i1, i2 = np.uintp(triangles[t, 0]), np.uintp(triangles[t, 1]), np.uintp(triangles[t, 2])
-            if cutout[t] < NEVER:
-                ya, yb = band[0], band[1] - 1
-            else:
-                ya, xa = min(bounds[i0, 0], bounds[i1, 0], bounds[i2, 0]), min(bounds[i0, 1], bounds[i1, 1], bounds[i2, 1])
-                yb, xb = -min(bounds[i0, 2], bounds[i1, 2], bounds[i2, 2]), -min(bounds[i0, 3], bounds[i1, 3], bounds[i2, 3])
-                ya, yb = max(ya, band[0]), min(yb, band[1] - 1)
-                if cutout[t] == NEVER or ya > yb or xa >= size[0] or xb < 0:
+        _bound_matrix(world, spans[k, 0], (0, pictured), one, middle, reach)
+        total += _find_ranges(world, triangles, cutout, spans[k], middle, reach, canvas, size, bounds, ranges, things[k])
+    active, n = np.empty((total, 6), np.int32), 0
+    for band in range(ends.shape[0]):
+        begin, end = band * BAND, min(band * BAND + BAND, size[1])
+        rows = _row_of(begin, canvas[2], canvas[0], pictured), _row_of(end - 1, canvas[2], canvas[0], pictured) + 1
+        for k in range(spans.shape[0]):
+            if things[k, 0] >= end or things[k, 1] < begin:
+                continue
+            i, first, last = spans[k, 0], spans[k, 1], spans[k, 2]
+            _bound_matrix(world, i, rows, one, middle, reach)
+            for t in range(first, last):
+                if ranges[t, 0] >= end or ranges[t, 1] < begin:
                     continue
-            active[count, 0], active[count, 1], active[count, 2], active[count, 3] = t, i, ya, yb
-            count += 1
-    return count
+                ya, yb, xa, xb = begin, end - 1, 0, size[0] - 1
+                if cutout[t] >= NEVER:
+                    for c in range(3):
+                        v = np.uintp(triangles[t, c])
+                        if stamp[v] != band:
+                            stamp[v] = band
+                            _bound_vertex(world, i, v, middle, reach, canvas, bounds)
+                    ya, yb, xa, xb = _united(bounds, triangles, t, size, (begin, end - 1))
+                if ya <= yb:
+                    active[n, 0], active[n, 1], active[n, 2], active[n, 3] = t, i, ya, yb
+                    active[n, 4], active[n, 5] = xa, xb
+                    n += 1
+        ends[band] = n
+    return active[:n]
 
 
 @inner
@@ -164,44 +217,35 @@ def is_turned_away(q, i0, i1, i2):
 
 
 @njit(_nrt=True)
-def draw(world, triangles, single, cutout, alpha_masks, spans, edge_on, canvas, reached, nearest, seen):
-    """Draw things into nearest (1/z, 0 if none) and seen (triangle, -1 if none), both in C order; the arguments are those of
-    `list_active`.
+def draw(world, triangles, single, cutout, alpha_masks, edge_on, canvas, active, ends, nearest, seen):
+    """Draw the triangles that `list_active` gives into nearest (1/z, 0 if none) and seen (triangle, -1 if none), in C order.
 
-    single (T,) marks single-sided triangles. edge_on (H,) marks the rows whose camera is in the plane of the ground. reached (N
-    + 1,) is set for the things, and the ground, that may be in the canvas.
+    single (T,) marks single-sided triangles. edge_on (H,) marks the rows whose camera is in the plane of the ground.
     """
     height, width = nearest.shape
     samples, x0, y0 = canvas
     count, rows = len(world[0]), world[6].shape[0]
-    q, cell = np.empty((count, 4)), np.empty((count, 4), np.int32)
-    bounds, stamp = np.empty((count, 4), np.int32), np.full(count, -1, np.int32)
-    active = np.empty((triangles.shape[0], 4), np.int32)
-    for first in range(0, height, BAND):
-        band = (first, min(first + BAND, height))
-        n = list_active(world, triangles, cutout, spans, band, canvas, (width, height), bounds, active)
-        for k in range(n):
-            reached[active[k, 1]] = True
-        for y in range(band[0], band[1]):
-            row = _row_of(y, y0, samples, rows)
-            for k in range(n):
-                if y < active[k, 2] or y > active[k, 3]:
-                    continue
-                t, i = np.uintp(active[k, 0]), active[k, 1]
-                is_ground = i == world[3].shape[0]
-                if is_ground and edge_on[row]:
-                    continue
-                corners = np.uintp(triangles[t, 0]), np.uintp(triangles[t, 1]), np.uintp(triangles[t, 2])
-                for v in corners:
-                    if stamp[v] != y:
-                        stamp[v] = y
-                        project_vertex(world, i, row, v, q)
-                        bound_vertex(q, v, samples, x0, y0, width, height, cell)
-                        if is_ground:
-                            cell[v, 0], cell[v, 1], cell[v, 2], cell[v, 3] = BEHIND, BEHIND, BEHIND, BEHIND
-                if single[t] and is_turned_away(q, corners[0], corners[1], corners[2]):
-                    continue
-                draw_one(np.int32(t), q, cell, corners, (y, y), canvas, cutout[t], alpha_masks, nearest, seen)
+    q, cell, stamp = np.empty((count, 4)), np.empty((count, 4), np.int32), np.full(count, -1, np.int32)
+    for y in range(height):
+        row = _row_of(y, y0, samples, rows)
+        for k in range(ends[y // BAND - 1] if y >= BAND else 0, ends[y // BAND]):
+            if y < active[k, 2] or y > active[k, 3]:
+                continue
+            t, i = np.uintp(active[k, 0]), active[k, 1]
+            is_ground = i == world[3].shape[0]
+            if is_ground and edge_on[row]:
+                continue
+            corners = np.uintp(triangles[t, 0]), np.uintp(triangles[t, 1]), np.uintp(triangles[t, 2])
+            for v in corners:
+                if stamp[v] != y:
+                    stamp[v] = y
+                    project_vertex(world, i, row, v, q)
+                    bound_vertex(q, v, samples, x0, y0, width, height, cell)
+                    if is_ground:
+                        cell[v, 0], cell[v, 1], cell[v, 2], cell[v, 3] = BEHIND, BEHIND, BEHIND, BEHIND
+            if single[t] and is_turned_away(q, corners[0], corners[1], corners[2]):
+                continue
+            draw_one(np.int32(t), q, cell, corners, (y, y), canvas, cutout[t], alpha_masks, nearest, seen)
 
 
 @inner
@@ -231,6 +275,34 @@ def _crosses(m, row, x, y, z, one, two):
     return True
 
 
+@inner
+def _is_steady(middle, reach, step, x, y, z):
+    """Return whether a point moves by less than a row from each row to the next, so that the picture shows it once."""
+    least, _ = _interval(middle, reach, 2, x, y, z)
+    if not least > 0.0:
+        return False
+    low, high = _interval(middle, reach, 1, x, y, z)
+    far = max(abs(low), abs(high)) / least
+    x, y, z = abs(x), abs(y), abs(z)
+    down = step[1, 0] * x + step[1, 1] * y + step[1, 2] * z + step[1, 3]
+    away = step[2, 0] * x + step[2, 1] * y + step[2, 2] * z + step[2, 3]
+    return down + far * away < STEADY * least
+
+
+@inner
+def _steps_to(m, x, y, z, one, two):
+    """Return whether a steady point is found between two rows by steps towards it, in one as by `_crosses`."""
+    height = m.shape[0]
+    _meet_row(m, height // 2, x, y, z, one)
+    for _ in range(STEPS):
+        row = min(max(np.int64(math.floor(one[1] - 0.5)), 0), height - 2)
+        if _crosses(m, row, x, y, z, one, two):
+            return True
+        if (row == 0 and one[1] <= 0.5) or (row == height - 2 and two[1] >= height - 0.5):
+            return False
+    return False
+
+
 @njit(_nrt=True)
 def find_pixels(points, m, out):
     """Fill out (n, 3): column and row at which a rolling shutter shows each point (n, 3) float64, and its w; NaN if it is
@@ -241,30 +313,55 @@ def find_pixels(points, m, out):
     or the last row.
     """
     height = m.shape[0]
-    middle, one, two = height // 2, np.empty(3), np.empty(3)
+    one, two = np.empty(3), np.empty(3)
+    middle, reach, step = np.empty((3, 4)), np.empty((3, 4)), np.zeros((3, 4))
+    for r in range(3):
+        for c in range(4):
+            low, high = m[:, r, c].min(), m[:, r, c].max()
+            middle[r, c], reach[r, c] = (low + high) / 2, (high - low) / 2 + SLACK * max(abs(low), abs(high))
+            for row in range(1, height):
+                step[r, c] = max(step[r, c], abs(m[row, r, c] - m[row - 1, r, c]))
     for i in range(points.shape[0]):
         x, y, z = points[i, 0], points[i, 1], points[i, 2]
         out[i, 0], out[i, 1], out[i, 2] = np.nan, np.nan, np.nan
-        off = np.inf
-        for step in range(height):
-            for side in range(2):
-                row = middle + step if side else middle - 1 - step
-                if row < 0 or row > height - 2 or not _crosses(m, row, x, y, z, one, two):
-                    continue
-                away = abs(one[1] - height / 2)
-                if away < off:
-                    off = away
-                    out[i, 0], out[i, 1], out[i, 2] = one[0], one[1], one[2]
-            if off < np.inf:
-                break
-        if off == np.inf:
-            _meet_row(m, 0, x, y, z, one)
-            _meet_row(m, height - 1, x, y, z, two)
-            above, below = one[2] > 0.0 and one[1] <= 0.5, two[2] > 0.0 and two[1] >= height - 0.5
-            if above and not (below and two[1] - height / 2 < height / 2 - one[1]):
-                out[i, 0], out[i, 1], out[i, 2] = one[0], one[1], one[2]
-            elif below:
-                out[i, 0], out[i, 1], out[i, 2] = two[0], two[1], two[2]
+        is_steady = height > 1 and _is_steady(middle, reach, step, x, y, z)
+        if is_steady and _steps_to(m, x, y, z, one, two):
+            out[i, 0], out[i, 1], out[i, 2] = one[0], one[1], one[2]
+            continue
+        if not (is_steady and _is_beyond(m, x, y, z, one, two)) and _scan(m, x, y, z, one, two, out[i]):
+            continue
+        _meet_row(m, 0, x, y, z, one)
+        _meet_row(m, height - 1, x, y, z, two)
+        above, below = one[2] > 0.0 and one[1] <= 0.5, two[2] > 0.0 and two[1] >= height - 0.5
+        if above and not (below and two[1] - height / 2 < height / 2 - one[1]):
+            out[i, 0], out[i, 1], out[i, 2] = one[0], one[1], one[2]
+        elif below:
+            out[i, 0], out[i, 1], out[i, 2] = two[0], two[1], two[2]
+
+
+@inner
+def _scan(m, x, y, z, one, two, out):
+    """Return whether a point is shown between two rows; out (3,) is the place nearest to the middle of the picture."""
+    height, off = m.shape[0], np.inf
+    for away in range(height):
+        for side in range(2):
+            row = height // 2 + away if side else height // 2 - 1 - away
+            if row < 0 or row > height - 2 or not _crosses(m, row, x, y, z, one, two):
+                continue
+            if abs(one[1] - height / 2) < off:
+                off = abs(one[1] - height / 2)
+                out[0], out[1], out[2] = one[0], one[1], one[2]
+        if off < np.inf:
+            return True
+    return False
+
+
+@inner
+def _is_beyond(m, x, y, z, one, two):
+    """Return whether a point is above the centre of the first row, or below that of the last, at the time of that row."""
+    _meet_row(m, 0, x, y, z, one)
+    _meet_row(m, m.shape[0] - 1, x, y, z, two)
+    return one[1] < 0.5 or two[1] > m.shape[0] - 0.5
 
 
 @njit

@@ -23,6 +23,15 @@ EDGE_ON = 1e-9
 """Height of a camera above the ground that counts as rounding error, relative to its distance from the origin plus a metre."""
 
 
+class Active(NamedTuple):
+    """The triangles that each band of rows may touch, `rows` (n, 6), and their `ends` (bands,): see
+    `kernels_rolling.list_active`.
+    """
+
+    rows: NDArray[np.int32]
+    ends: NDArray[np.int64]
+
+
 class _RolledWorld(NamedTuple):
     """Vertices and the poses of each row, as `kernels_rolling.list_active` takes them."""
 
@@ -49,9 +58,9 @@ def rolled_world(geometry: Geometry, camera: Camera, rows: RowPoses) -> _RolledW
 
 def rolled(
     geometry: Geometry, camera: Camera, rows: RowPoses, samples: int, object_id: int | None, window: Window | None
-) -> tuple[Float, NDArray[np.int32], NDArray[np.bool_]]:
+) -> tuple[Float, NDArray[np.int32], Active]:
     """1/s (0 if none) and triangle (-1 if none) at each sample of `rasterize`, for a camera whose rows have poses of their own.
-    Also a mask of the things that may be in the picture.
+    Also the triangles that each band of rows may touch.
 
     RowPoses outside the picture have the poses of its first or its last row.
     """
@@ -64,9 +73,11 @@ def rolled(
     chosen = things if object_id is None else things[object_id - 1 : object_id]
     cut = geometry.triangle_cutout, geometry.alpha_masks.arrays
     world, canvas = rolled_world(geometry, camera, rows), (samples, x0, y0)
-    edge, reached = edge_on(geometry, rows), np.zeros(len(geometry.poses) + 1, np.bool_)
-    kernels.draw(tuple(world), geometry.triangles, single, *cut, chosen, edge, canvas, reached, nearest, seen)
-    return nearest, seen, reached[:-1]
+    size, ends = (x1 - x0, y1 - y0), np.empty(-(-(y1 - y0) // kernels.BAND), np.int64)
+    active = kernels.list_active(tuple(world), geometry.triangles, cut[0], chosen, canvas, size, ends)
+    edge = edge_on(geometry, rows)
+    kernels.draw(tuple(world), geometry.triangles, single, *cut, edge, canvas, active, ends, nearest, seen)
+    return nearest, seen, Active(active, ends)
 
 
 def single_of(geometry: Geometry) -> NDArray[np.bool_]:

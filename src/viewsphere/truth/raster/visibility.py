@@ -13,7 +13,7 @@ from viewsphere.geometry.camera import inverse_camera_matrix, pixel_rays
 from viewsphere.geometry.lenses import Window
 from viewsphere.model.sensors.camera import Camera, Intrinsics
 from viewsphere.truth.raster.geometry import Geometry, seen_from
-from viewsphere.truth.raster.rolling import rolled
+from viewsphere.truth.raster.rolling import Active, rolled
 
 LARGEST_AROUND = 4_000_000  # pixels of a ray table that reaches beyond the image (100 MB)
 
@@ -59,7 +59,7 @@ class Visibility:
     inverse_depth: NDArray[np.float32]
     corners: NDArray[np.float64] | None = None  # `homogeneous` of all vertices, which labels and the raster engine use again
     exact: NDArray[np.float64] | None = None  # 1/s before rounding, if requested
-    reached: NDArray[np.bool_] | None = None  # under a rolling shutter, the things that may be in the picture
+    active: Active | None = None  # of a picture under a rolling shutter
     _instances: dict[Geometry, Instances] = field(default_factory=dict[Geometry, Instances], repr=False)
 
     def instances(self, geometry: Geometry) -> Instances:
@@ -103,8 +103,9 @@ def rasterize(
     pictures do not need that memory.
     """
     if camera.rows is not None:
-        nearest, seen, reached = rolled(geometry, camera, camera.rows, subdivision, object_id, window)
-        return Visibility(seen, nearest.astype(np.float32), None, nearest, reached)
+        nearest, seen, active = rolled(geometry, camera, camera.rows, subdivision, object_id, window)
+        is_picture = subdivision == 1 and not object_id and window is None
+        return Visibility(seen, nearest.astype(np.float32), None, nearest, active if is_picture else None)
     is_whole = not object_id and window is None
     if object_id:
         part = _range(geometry, object_id)
@@ -209,8 +210,10 @@ def left_out(geometry: Geometry, q: NDArray[np.float64]) -> NDArray[np.bool_]:
 
 def things_in(geometry: Geometry, camera: Camera, visibility: Visibility) -> list[int]:
     """The things that may be in a camera's picture."""
-    if visibility.reached is not None:
-        return np.flatnonzero(visibility.reached).tolist()
+    if visibility.active is not None:
+        there = np.zeros(len(geometry.poses) + 1, np.bool_)
+        there[visibility.active.rows[:, 1]] = True
+        return np.flatnonzero(there[:-1]).tolist()
     q = homogeneous(geometry, camera) if visibility.corners is None else visibility.corners
     return np.flatnonzero(~left_out(geometry, q)).tolist()
 

@@ -31,7 +31,7 @@ from viewsphere.truth.raster.kernels_draw import (
 )
 from viewsphere.truth.raster.kernels_parallel import covers, depth_at, surface_of
 from viewsphere.truth.raster.kernels_rays import ABOVE, ANY_DEPTH, LEAF, NO_BOX, leaf_list, limits, pixel_box, touched
-from viewsphere.truth.raster.kernels_rolling import BAND, is_turned_away, list_active, project_vertex
+from viewsphere.truth.raster.kernels_rolling import BAND, is_turned_away, project_vertex
 
 U = nb.uintp
 TIE = 1e-5  # relative difference of 1/z below which two surfaces count as coincident
@@ -593,32 +593,28 @@ def _cast_checked(surface, px, py, inverse, p, alpha_masks, triangles, solid, fr
 
 @njit(_nrt=True)
 def draw_rolling(
-    world, triangles, single, chosen, cutout, alpha_masks, see_through, spans, edge_on, points, solid, fragments, q
+    world, triangles, single, chosen, cutout, alpha_masks, see_through, edge_on, active, ends, points, solid, fragments, q
 ):
-    """The equivalent of `draw` under a rolling shutter, for the triangles in `chosen` (T,); world, single, spans and edge_on
-    are those of `kernels_rolling.draw`. q (V, 4), also in `fragments`, holds the vertices of the row that is drawn.
+    """The equivalent of `draw` under a rolling shutter, for the triangles in `chosen` (T,); the other arguments are those of
+    `kernels_rolling.draw`. q (V, 4), also in `fragments`, holds the vertices of the row that is drawn.
     """
     grid = points[0]
     height, width = grid.shape
-    found = np.empty(max(width, MEDIUM * MEDIUM) + 1, np.uint32)
-    count = world[0].shape[0]
-    bounds, stamp = np.empty((count, 4), np.int32), np.full(count, -1, np.int32)
-    active = np.empty((triangles.shape[0], 4), np.int32)
-    for begin in range(0, height, BAND):
-        band = (begin, min(begin + BAND, height))
-        n = list_active(world, triangles, cutout, spans, band, (1, 0, 0), (width, height), bounds, active)
-        for y in range(band[0], band[1]):
-            if points[1][first(grid, y, 0)] >= (y + 1) * width:
-                continue  # no pixel of the row is chosen
-            for k in range(n):
-                t, i = U(active[k, 0]), active[k, 1]
-                if y < active[k, 2] or y > active[k, 3] or not chosen[t] or (i == world[3].shape[0] and edge_on[y]):
-                    continue
-                corners = U(triangles[t, 0]), U(triangles[t, 1]), U(triangles[t, 2])
-                for v in corners:
-                    if stamp[v] != y:
-                        stamp[v] = y
-                        project_vertex(world, i, y, v, q)
-                if single[t] and is_turned_away(q, corners[0], corners[1], corners[2]):
-                    continue
-                _draw_one(np.int64(t), q, triangles, (y, y), cutout, alpha_masks, see_through, points, solid, fragments, found)
+    found, stamp = np.empty(max(width, MEDIUM * MEDIUM) + 1, np.uint32), np.full(world[0].shape[0], -1, np.int32)
+    for y in range(height):
+        if points[1][first(grid, y, 0)] >= (y + 1) * width:
+            continue  # no pixel of the row is chosen
+        for k in range(ends[y // BAND - 1] if y >= BAND else 0, ends[y // BAND]):
+            t, i = U(active[k, 0]), active[k, 1]
+            if y < active[k, 2] or y > active[k, 3] or not chosen[t] or (i == world[3].shape[0] and edge_on[y]):
+                continue
+            if points[1][first(grid, y, active[k, 4])] > y * width + active[k, 5]:
+                continue  # no pixel that the triangle may touch is chosen
+            corners = U(triangles[t, 0]), U(triangles[t, 1]), U(triangles[t, 2])
+            for v in corners:
+                if stamp[v] != y:
+                    stamp[v] = y
+                    project_vertex(world, i, y, v, q)
+            if single[t] and is_turned_away(q, corners[0], corners[1], corners[2]):
+                continue
+            _draw_one(np.int64(t), q, triangles, (y, y), cutout, alpha_masks, see_through, points, solid, fragments, found)

@@ -16,7 +16,7 @@ from viewsphere.geometry.camera import pixel_rays
 from viewsphere.model.sensors.camera import Camera, Intrinsics
 from viewsphere.model.sensors.rolling import RowPoses
 from viewsphere.truth.raster.geometry import Geometry, seen_from
-from viewsphere.truth.raster.rolling import edge_on, rolled_world, single_of, spans_of
+from viewsphere.truth.raster.rolling import Active, edge_on, rolled_world, single_of
 from viewsphere.truth.raster.visibility import (
     RayTable,
     Runs,
@@ -99,7 +99,9 @@ def edge_samples(
         pixels, position, triangle, inverse = _pinhole_edges(geometry, visibility, marks, q, owner, normals, behind)
         samples = Samples(pixels, position, np.zeros((0, 3), np.float32), triangle, inverse)
     else:
-        points = _Points.from_marks(camera, marks[: visibility.triangle.size].reshape(visibility.triangle.shape), 4, 1)
+        points = _Points.from_marks(
+            camera, marks[: visibility.triangle.size].reshape(visibility.triangle.shape), 4, 1, visibility.active
+        )
         _draw_all(points, geometry, q, visibility.triangle)
         known = np.zeros(0, np.float32)
         found = points.pixels[:-1], points.nearest.astype(np.float32), points.seen, known, _ROTATED
@@ -145,14 +147,17 @@ def layers(
     see_through: Bool,
     pixels: Int32 | None = None,
     corners: NDArray[np.float64] | None = None,
+    active: Active | None = None,
 ) -> list[Layer]:
     """Surfaces at the points that see through something: the solid surfaces behind, then the see-through ones, back to front.
 
     The points, with the triangle that each shows (N,), are all pixels' centres in order, or the four samples of each of
     `pixels`; a slot is a point's index. see_through (T + 1,): the last entry, for triangle -1, is False; `corners` is
-    `Visibility.corners`, if known. The first layer has the nearest solid surfaces (nothing if there is none), the second the
-    farthest see-through surface of every such point. The third has the next surface of points with two, and so on up to 8;
-    farther surfaces are left out. The list is empty if nothing is see-through.
+    `Visibility.corners`, if known, and `active` is `Visibility.active`.
+
+    The first layer has the nearest solid surfaces (nothing if there is none), the second the farthest see-through surface of
+    every such point. The third has the next surface of points with two, and so on up to 8; farther surfaces are left out. The
+    list is empty if nothing is see-through.
 
     A see-through surface that coincides with a solid one (1/z equal within 1e-5) is in front of it. Of two coincident
     see-through surfaces, the later triangle is in front: decals are on top.
@@ -177,7 +182,10 @@ def layers(
         chosen = np.flatnonzero(kernels.touched_boxes(q, clear, geometry.triangles, reach, farthest))
     else:
         chosen = _touched(
-            _Points.from_marks(camera, (farthest != kernels_chosen.CLOSED).view(np.uint8), count, 1), geometry, q, see_through
+            _Points.from_marks(camera, (farthest != kernels_chosen.CLOSED).view(np.uint8), count, 1, active),
+            geometry,
+            q,
+            see_through,
         )
     stacks: list[list[Layer]] = []
     step = POINTS_AT_ONCE // count
@@ -186,7 +194,7 @@ def layers(
         rows = part if pixels is None else row_of[part]
         marks = np.zeros(shape, np.uint8)
         marks.reshape(-1)[part] = 1
-        points = _Points.from_marks(camera, marks, count, MOST_LAYERS)
+        points = _Points.from_marks(camera, marks, count, MOST_LAYERS, active)
         _pile(points, geometry, q, see_through, clear, (shown[0][rows], shown[1][rows]))
         slots = (rows[:, None] * count + np.arange(count)).reshape(-1).astype(np.int32)
         stacks.append(_sorted(points, slots))
@@ -263,9 +271,10 @@ class _Points:
     inverses: NDArray[np.float64]
     listed: Int32
     counts: NDArray[np.uint8]
+    active: Active | None
 
     @classmethod
-    def from_marks(cls, camera: Camera, marks: NDArray[np.uint8], count: int, capacity: int) -> _Points:
+    def from_marks(cls, camera: Camera, marks: NDArray[np.uint8], count: int, capacity: int, active: Active | None) -> _Points:
         """The marked pixels, with `count` points each, and room for up to `capacity` see-through surfaces per point."""
         grid, pixels = kernels_chosen.numbered(marks)
         n = len(pixels) - 1
@@ -279,6 +288,7 @@ class _Points:
             np.empty((n, count, capacity)),
             np.empty((n, count, capacity), np.int32),
             np.zeros((n, count), np.uint8),
+            active,
         )
 
     @cached_property
@@ -319,12 +329,13 @@ class _Points:
         offsets, reach = (_CENTER, _CENTER_REACH) if self.nearest.shape[1] == 1 else (_ROTATED, _ROTATED_REACH)
         chosen = np.zeros(len(geometry.triangles), np.bool_)
         chosen[order] = True
-        q = np.empty((len(geometry.coordinates), 4))
+        q, active = np.empty((len(geometry.coordinates), 4)), self.active
+        assert active is not None
         surfaces = chosen, geometry.triangle_cutout, geometry.alpha_masks.arrays, see_through
         solid = self.nearest, self.seen, self.farthest, kernels_chosen.tiled(self.farthest)
         kernels.draw_rolling(
             tuple(rolled_world(geometry, self.camera, rows)),
-            *(geometry.triangles, single_of(geometry), *surfaces, spans_of(geometry), edge_on(geometry, rows)),
+            *(geometry.triangles, single_of(geometry), *surfaces, edge_on(geometry, rows), *active),
             *((self.grid, self.pixels, offsets, reach), solid, (self.inverses, self.listed, self.counts, q), q),
         )
 

@@ -87,7 +87,7 @@ def mirrored(baked: Baked, camera: Camera, plane: float, left_out: NDArray[np.bo
     triangle[at], depth[at] = visibility.triangle.reshape(-1)[at], visibility.inverse_depth.reshape(-1)[at]
     light = np.zeros((len(triangle), 4), np.float32)
     shape = visibility.triangle.shape
-    seen = Visibility(triangle.reshape(shape), depth.reshape(shape), reached=visibility.reached)
+    seen = Visibility(triangle.reshape(shape), depth.reshape(shape), active=visibility.active)
     shade_all(mirror, below, seen, triangle, depth, light, NO_SPLIT)
     sky = np.ones_like(light)
     sky[at] = 0  # read only here

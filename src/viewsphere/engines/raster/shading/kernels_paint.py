@@ -369,16 +369,19 @@ def brighten_lines(pixels, means, width, radiance):
 
 
 @njit
-def aim_rows(at, row, which, turns, shifts, rays, begin):
+def aim_rows(slots, at, row, which, turns, shifts, rays, begin):
     """Fill rays (S, 3) float32 with turns[which, row] (x, y, 1) for positions `at` (S, 2), and begin with shifts[which, row].
+
+    Only these slots (n,) int32 are filled.
 
     turns (M, H, 3, 3) and shifts (M, H, 3) are float64.
     """
-    for i in range(U(at.shape[0])):
+    for k in range(U(slots.shape[0])):
+        i = U(slots[k])
         m, r, x, y = U(which[i]), U(row[i]), at[i, U(0)], at[i, U(1)]
-        for k in range(U(3)):
-            rays[i, k] = turns[m, r, k, U(0)] * x + turns[m, r, k, U(1)] * y + turns[m, r, k, U(2)]
-            begin[i, k] = shifts[m, r, k]
+        for c in range(U(3)):
+            rays[i, c] = turns[m, r, c, U(0)] * x + turns[m, r, c, U(1)] * y + turns[m, r, c, U(2)]
+            begin[i, c] = shifts[m, r, c]
 
 
 @inner

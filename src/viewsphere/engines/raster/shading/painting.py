@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -189,7 +190,7 @@ def shade_all(
         more(radiance)
     # Layers are also listed if a solid surface is in front, because a decal may be on that surface.
     pixels = None if samples is None else samples.pixels
-    stack = layers(baked.blended, camera, triangle, depth, baked.see_through, pixels, visibility.corners)
+    stack = layers(baked.blended, camera, triangle, depth, baked.see_through, pixels, visibility.corners, visibility.active)
     reached = depth if air is None else depth.copy()  # 1/depth up to which air has attenuated light
     first, behind = _nearest_glass(baked, stack, len(triangle)), triangle
     for i, layer in enumerate(stack):
@@ -200,7 +201,7 @@ def shade_all(
             reached[layer.slot] = layer.inverse_depth
         behind, behind_depth = triangle.copy(), depth.copy()
         behind[layer.slot], behind_depth[layer.slot] = layer.triangle, layer.inverse_depth
-        view = view_of(baked, camera, samples, behind) if camera.rows is not None else view
+        view = view_of(baked, camera, samples, behind, layer.slot) if camera.rows is not None else view
         is_ground, is_bent = baked.kind[layer.triangle] == kernels_paint.FLOOR, first[layer.slot] == i
         for which in (False, True):
             slots = layer.slot[(is_ground == which) & ~is_bent]
@@ -274,14 +275,21 @@ def _shade_some(
         kernels_split.split(*given, split)
 
 
-def view_of(baked: Baked, camera: Camera, samples: Samples | None = None, triangle: Int32 | None = None) -> PictureRays:
+def view_of(
+    baked: Baked,
+    camera: Camera,
+    samples: Samples | None = None,
+    triangle: Int32 | None = None,
+    slots: Int32 | None = None,
+) -> PictureRays:
     """The rays of a camera's pixel centres, or of these samples.
 
-    Under a rolling shutter they lead to the triangles (S,) that they meet, where these are at the instant.
+    Under a rolling shutter they lead to the triangles (S,) that they meet, where these are at the instant, and are there only
+    where they meet one, or at these slots (n,) alone.
     """
     rays, places, shifts = _NO_RAYS, _NO_PLACES, _NO_RAYS
     if camera.rows is not None:
-        rays, shifts = _rays_of_rows(baked, camera, camera.rows, samples, triangle)
+        rays, shifts = _rays_of_rows(baked, camera, camera.rows, samples, triangle, slots)
     table = lens_rays(camera)
     if camera.lens.is_parallel:
         shifts = _shifts(baked, camera, samples)
@@ -304,8 +312,28 @@ def view_of(baked: Baked, camera: Camera, samples: Samples | None = None, triang
     )
 
 
+@lru_cache(maxsize=4)
+def _ways(geometry: Geometry, camera: Camera) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """`ways_of_rows` of all moving things, which all parts of a picture share."""
+    assert camera.rows is not None
+    there = [i for i in camera.rows.moving if i < len(geometry.poses)]
+    return ways_of_rows(camera, camera.rows, {i: geometry.poses[i] for i in there})
+
+
+@lru_cache(maxsize=2)
+def _centers(width: int, height: int) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    """The rows (n,) and the places (n, 2) of a picture's pixel centres."""
+    row, column = np.divmod(np.arange(width * height), width)
+    return row, np.stack([column, row], axis=1) + 0.5
+
+
 def _rays_of_rows(
-    baked: Baked, camera: Camera, rows: RowPoses, samples: Samples | None, triangle: Int32 | None
+    baked: Baked,
+    camera: Camera,
+    rows: RowPoses,
+    samples: Samples | None,
+    triangle: Int32 | None,
+    slots: Int32 | None,
 ) -> tuple[Float32, Float32]:
     """Rays (S, 3) in the camera's axes at the instant, and from the eye to where they begin, (S, 3) in the stage's axes.
 
@@ -313,18 +341,19 @@ def _rays_of_rows(
     """
     geometry, width = baked.geometry, camera.width
     there = [i for i in rows.moving if i < len(geometry.poses)]
-    turns, shifts = ways_of_rows(camera, rows, {i: geometry.poses[i] for i in there})
+    turns, shifts = _ways(geometry, camera)
     slot = np.zeros(len(geometry.poses) + 2, np.int64)
     slot[there] = np.arange(1, len(there) + 1)
     if samples is None:
-        row, column = np.divmod(np.arange(width * camera.height), width)
-        at = np.stack([column, row], axis=1) + 0.5
+        row, at = _centers(width, camera.height)
     else:
         row, at = np.repeat(samples.pixels // width, 4), samples.position.astype(np.float64)
     of_triangle = np.append(slot[owners_of(geometry)], 0)  # the last one is that of the sky
     which = np.zeros(len(at), np.int64) if triangle is None else of_triangle[triangle]
-    out, begin = np.empty((2, len(at), 3), np.float32)
-    kernels_paint.aim_rows(at, row, which, turns, (shifts / baked.unit), out, begin)
+    if slots is None:
+        slots = np.arange(len(at), dtype=np.int32) if triangle is None else np.flatnonzero(triangle >= 0).astype(np.int32)
+    out, begin = np.zeros((2, len(at), 3), np.float32)
+    kernels_paint.aim_rows(slots, at, row, which, turns, (shifts / baked.unit), out, begin)
     return out, begin
 
 
