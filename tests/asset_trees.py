@@ -46,5 +46,7 @@ def planned(source: str, folder: Path | None = None, splits: dict[str, object] |
 def faces_front(spec: ModelSpec, size: float = 1.0) -> bool:
     """Return whether a loaded `pointer` of this size in metres points to -Y at its top."""
     vertices = load_normalised(spec).vertices.astype(float)
-    tip, (low, high) = vertices[vertices[:, 1].argmin()], (vertices.min(axis=0), vertices.max(axis=0))
-    return bool(np.allclose(high - low, (size, 1.1 * size, size), rtol=1e-4) and abs(tip[2] - high[2]) < 1e-4 * size)
+    low, high = vertices.min(axis=0), vertices.max(axis=0)
+    ahead = np.unique(vertices[vertices[:, 1] < low[1] + 0.01 * size].round(6), axis=0)  # the tip; of a cube, four corners
+    is_tip = len(ahead) == 1 and abs(ahead[0, 2] - high[2]) < 1e-4 * size
+    return bool(is_tip and np.allclose(high - low, (size, 1.1 * size, size), rtol=1e-4))
