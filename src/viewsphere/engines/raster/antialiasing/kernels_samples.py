@@ -121,7 +121,7 @@ def draw(q, order, triangles, cutout, alpha_masks, see_through, points, solid, f
         _draw_one(t, q, triangles, rows, cutout, alpha_masks, see_through, points, solid, fragments, found)
 
 
-@inner
+@inner(forceinline=True)  # a call would copy all arguments to the stack: half as long again
 def _draw_one(t, q, triangles, rows, cutout, alpha_masks, see_through, points, solid, fragments, found):
     """Draw a triangle into these rows, the last one included."""
     grid, _, _, _ = points
