@@ -13,6 +13,7 @@ from viewsphere.geometry.rotation import rotation_about
 from viewsphere.model.sensors.camera import Camera
 from viewsphere.model.sensors.rolling import Rolling, RowPoses
 from viewsphere.truth.raster.geometry import Geometry
+from viewsphere.truth.raster.rolling import pixels_in_rows
 from viewsphere.truth.raster.visibility import rasterize
 
 
@@ -111,3 +112,40 @@ def test_a_spinning_camera_slants_a_vertical_pole():
         columns = np.array([np.flatnonzero(row)[0 if side < 0 else -1] for row in seen]) + (0 if side < 0 else 1)
         assert (np.abs(columns - edge) <= 0.5 + 1e-2).all()
     assert abs(edge[0] - edge[-1]) > 7
+
+
+def shown_rows(camera: Camera, pose: np.ndarray, point: np.ndarray) -> list[tuple[float, float]]:
+    """All places at which rows show a point of a still thing, between neighbouring rows, and beyond the ends."""
+    rows = camera.rows
+    world = pose[:3, :3] @ point + pose[:3, 3]
+    seen = np.array([camera.K @ (turn @ world + shift) for turn, shift in zip(rows.rotation, rows.translation, strict=True)])
+    x, y, w = seen[:, 0] / seen[:, 2], seen[:, 1] / seen[:, 2], seen[:, 2]
+    off, found = y - (np.arange(len(y)) + 0.5), []
+    for r in range(len(y) - 1):
+        if w[r] > 0 and w[r + 1] > 0 and off[r] * off[r + 1] <= 0:
+            share = off[r] / (off[r] - off[r + 1])
+            found.append((x[r] + share * (x[r + 1] - x[r]), r + 0.5 + share))
+    found += [(x[0], y[0])] if w[0] > 0 and off[0] <= 0 else []
+    return found + ([(x[-1], y[-1])] if w[-1] > 0 and off[-1] >= 0 else [])
+
+
+@pytest.mark.parametrize(("turn", "shift"), [(0.02, 0.02), (0.4, 0.3), (3.0, 1.0), (9.0, 2.0)])
+def test_a_point_is_where_the_row_nearest_to_the_instant_shows_it(turn, shift):
+    """Slow motions show each point once; fast ones several times, or never."""
+    rng = np.random.default_rng(5)
+    geometry = placed(cube(0.4))
+    counts = set()
+    for _ in range(6):
+        camera = orbit_camera(lens(64, 48), rng.uniform(0, 6), rng.uniform(0, 1), rng.uniform(0.8, 3))
+        camera = rolling_camera(camera, geometry, rng, turn, shift)
+        points = rng.normal(size=(60, 3)) * 0.8
+        found, z = pixels_in_rows(camera, camera.rows, 0, geometry.poses[0], points)
+        for own, depth, point in zip(found, z, points, strict=True):
+            places = shown_rows(camera, geometry.poses[0], point)
+            counts.add(len(places))
+            assert np.isnan(own).all() == (not places) == np.isnan(depth)
+            if places:
+                nearest = min(abs(y - 24) for _, y in places)
+                assert abs(abs(own[1] - 24) - nearest) < 1e-6
+                assert min(math.dist(own, place) for place in places) < 1e-6
+    assert 1 in counts and (turn < 1 or counts & {0, 2, 3})

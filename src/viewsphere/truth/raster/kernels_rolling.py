@@ -345,7 +345,7 @@ def _scan(m, x, y, z, one, two, out):
     height, off = m.shape[0], np.inf
     for away in range(height):
         for side in range(2):
-            row = height // 2 + away if side else height // 2 - 1 - away
+            row = (height - 1) // 2 + away if side else height // 2 - 1 - away
             if row < 0 or row > height - 2 or not _crosses(m, row, x, y, z, one, two):
                 continue
             if abs(one[1] - height / 2) < off:
