@@ -66,7 +66,8 @@ def test_a_wrong_camera_is_one_line(camera, told):
     [
         (
             {"projection": "orthographic", "width_n": 2},
-            "camera.width_n: 'width_n' is unknown; did you mean 'width_m'? Valid: projection, width_m, size, rolling, imager",
+            "camera.width_n: 'width_n' is unknown; did you mean 'width_m'? Valid: projection, width_m, size, rolling, imager, "
+            "also",
         ),
         ({"width_m": 2}, "camera.width_m: expected projection: orthographic beside it; found none: set projection"),
         (

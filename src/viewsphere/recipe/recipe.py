@@ -37,7 +37,7 @@ from viewsphere.model.fields.frozen import Frozen
 from viewsphere.model.fields.notebook import Shown
 from viewsphere.model.fields.numbers import Count, Natural, Number
 from viewsphere.model.sensors.lidar import LIDAR
-from viewsphere.recipe.cameras.rig import RigField, SensorList
+from viewsphere.recipe.cameras.rig import RigField, SensorList, with_twins
 from viewsphere.recipe.cameras.sequence import TimeEntry
 from viewsphere.recipe.cameras.tracks import TracksEntry
 from viewsphere.recipe.cameras.viewpoints import Viewpoints
@@ -273,7 +273,7 @@ class Recipe(Shown, Frozen):
     def _plain(cls, data: Any) -> Any:
         plain = _plain(data)
         refuse_both_names(plain)
-        return with_present_names(plain)
+        return with_twins(with_present_names(plain))
 
     @model_validator(mode="wrap")
     @classmethod

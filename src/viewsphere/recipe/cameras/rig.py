@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from typing import Annotated, Any, Literal, cast
 
-from pydantic import BeforeValidator, Discriminator, Field, Tag, field_validator, model_validator
+from pydantic import BeforeValidator, Discriminator, Field, Tag, ValidationError, field_validator, model_validator
 
 from viewsphere.model.fields.frozen import Frozen
 from viewsphere.model.fields.numbers import Count, Length, Metres, Number, Positive
+from viewsphere.model.sensors.rig import CAMERA
 from viewsphere.recipe.cameras.lens import DistortionField
 from viewsphere.recipe.cameras.lidar import LidarEntry
 from viewsphere.recipe.cameras.projection import WithProjection
 from viewsphere.recipe.values import OrShort, pair
 from viewsphere.recipe.world.scene import CameraEntry, CameraMatrix, PictureSize, Row
-from viewsphere.validation.errors import shown
+from viewsphere.validation.errors import error_at, explained, shown
 
 MOST_SENSORS = 64
 """Limit of sensors in a rig, which protects from files made by mistake."""
@@ -136,6 +138,45 @@ class SensorList(Frozen):
     def has_lidar(self) -> bool:
         """True if one of them is a LiDAR."""
         return any(entry.lidar is not None for entry in self.sensors.values())
+
+
+def with_twins(given: Any) -> Any:
+    """A recipe's fields with a rig of the camera and of those that it has in `also`: sensors at the same place."""
+    if not isinstance(given, Mapping):
+        return given
+    given = cast("Mapping[str, Any]", given)
+    camera = given.get("camera")
+    if isinstance(camera, CameraEntry):
+        camera = camera.model_dump(mode="json", exclude_unset=True) if camera.also is not None else None
+    twins = camera.get("also") if isinstance(camera, Mapping) else None
+    if not isinstance(camera, Mapping) or not isinstance(twins, Mapping):
+        return given
+    if given.get("rig") is not None:
+        with error_at("camera", "also"):
+            raise ValueError("expected none beside rig, which has all sensors; found some: list them there")
+    entries = cast("Mapping[str, Any]", twins)
+    for name, values in entries.items():
+        with error_at("camera", "also", str(name)):
+            _check_twin(name, values)
+    rest = {field: value for field, value in cast("Mapping[str, Any]", camera).items() if field != "also"}
+    return {**given, "camera": rest, "rig": {"kind": "sensors", "sensors": {CAMERA: {}, **entries}}}
+
+
+def _check_twin(name: str, values: Any) -> None:
+    """Raise ValueError for a twin that is no camera with a lens of its own, or that stands elsewhere."""
+    if not re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,63}", str(name)):
+        raise ValueError(f"expected a name of letters, digits, '_', '.' and '-'; found {shown(name)}")
+    if str(name).casefold() == CAMERA:
+        raise ValueError(f"expected another name; found {name}, the first camera's")
+    if not isinstance(values, Mapping) or not any(lens in values for lens in OWN_LENSES):
+        raise ValueError(f"expected a mapping with one of {', '.join(OWN_LENSES)}; found {shown(values)}")
+    for field in ("position", "rotation", "look", "lidar"):
+        if field in values:
+            raise ValueError(f"expected none of position, rotation, look and lidar; found {field}: list all sensors in rig")
+    try:
+        SensorEntry.model_validate(values)
+    except ValidationError as error:
+        raise explained(error, tuple(SensorEntry.model_fields)) from None
 
 
 class StereoRig(Frozen):

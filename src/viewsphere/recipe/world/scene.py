@@ -138,7 +138,13 @@ class CameraEntry(WithProjection):
         "default a perfect one",
     )
 
-    OMIT_IF_NONE = ("imager",)
+    also: dict[str, dict[str, Any]] | None = Field(
+        default=None,
+        description="further cameras at the same place that look the same way, by name, each with its own lens: {pinhole: "
+        "{fov_deg: 90}}; the recipe then has a rig of all",
+    )
+
+    OMIT_IF_NONE = ("imager", "rolling", "also")
 
     @model_validator(mode="before")
     @classmethod

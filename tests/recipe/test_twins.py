@@ -1,0 +1,83 @@
+"""Twins of a camera: further lenses at the same place, rendered instead of resampled."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from small import small_recipe
+from viewsphere import Dataset, generate, plan
+from viewsphere.check import check
+from viewsphere.errors import RecipeError
+
+BENT = {"model": "brown_conrady", "coefficients": [-0.3, 0.08, 0.001, -0.002]}
+CAMERA = {"size": [96, 72], "focal_px": 80, "distortion": BENT}
+PINHOLE = {"fov_deg": 50, "size": [64, 48]}
+
+
+def with_also(also, **changes):
+    return small_recipe(**{"camera": {**CAMERA, "also": also}, "formats": [], **changes})
+
+
+def test_a_twin_is_a_sensor_at_the_camera_s_place():
+    recipe = with_also({"pinhole": PINHOLE, "around": {"projection": "equirectangular", "size": [64, 32]}}, channels=["rgb"])
+    rig = plan(recipe).rig
+    assert [sensor.name for sensor in rig.sensors] == ["camera", "pinhole", "around"]
+    assert all(np.array_equal(sensor.rig_from_sensor, np.eye(4)) for sensor in rig.sensors)
+    bent, straight, around = (sensor.intrinsics for sensor in rig.sensors)
+    assert bent == small_recipe(camera=CAMERA).camera.intrinsics
+    assert straight.lens.is_linear and (straight.width, straight.height) == (64, 48)
+    assert straight.lens.field_of_view()[0] == pytest.approx(50)
+    assert around.lens.name == "equirectangular"
+
+
+def test_a_recipe_with_twins_is_one_with_a_rig():
+    recipe = with_also({"pinhole": PINHOLE}, channels=["rgb"])
+    rig = {"sensors": {"camera": {}, "pinhole": PINHOLE}}
+    same = small_recipe(camera=CAMERA, rig=rig, formats=[], channels=["rgb"])
+    assert recipe == same and recipe.digest == same.digest
+    assert type(recipe).model_validate(recipe.model_dump(mode="json")).digest == recipe.digest
+
+
+@pytest.mark.slow
+def test_labels_of_a_twin_are_those_of_its_own_lens_at_the_same_points(tmp_path):
+    """Both pictures are proved, and a pixel's surface is where the other lens shows it."""
+    generate(with_also({"pinhole": PINHOLE}, channels=["rgb", "depth", "position", "instances"]), tmp_path / "out", workers=0)
+    dataset = Dataset(tmp_path / "out")
+    report = check(dataset)
+    assert not report.findings, report.findings
+    bent, straight = dataset[0], dataset[1]
+    assert np.array_equal(bent.camera.center, straight.camera.center) and np.array_equal(bent.camera.R, straight.camera.R)
+    seen = straight.instances > 0
+    points = straight.position[seen].astype(np.float64) @ bent.camera.R.T + bent.camera.t
+    xy, is_shown = bent.camera.lens.project(points)
+    column, row = np.floor(xy[is_shown]).astype(int).T
+    inside = (column >= 0) & (column < 96) & (row >= 0) & (row < 72)
+    same = bent.instances[row[inside], column[inside]] == straight.instances[seen][is_shown][inside]
+    assert inside.sum() > 100 and same.mean() > 0.9  # but for edges
+
+
+@pytest.mark.parametrize(
+    ("also", "told"),
+    [
+        ({"pinhole": {}}, "camera.also.pinhole: expected a mapping with one of fov_deg, .*; found"),
+        ({"pinhole": True}, "camera.also.pinhole: expected a mapping with one of fov_deg"),
+        ({"camera": PINHOLE}, "camera.also.camera: expected another name; found camera"),
+        ({"pinhole": {"fov_deg": 200}}, "camera.also.pinhole.fov_deg: expected a number less than 180; found 200"),
+        ({"pinhole": {"fov_deg": 50, "fov": 2}}, "camera.also.pinhole.fov: .*unknown"),
+        (
+            {"pinhole": {"fov_deg": 50, "position": [1, 0, 0]}},
+            "camera.also.pinhole: expected none of position, .*; found position",
+        ),
+        ({"pin hole": PINHOLE}, "camera.also.pin hole: expected a name of letters"),
+    ],
+)
+def test_a_wrong_twin_is_one_line(also, told):
+    with pytest.raises(RecipeError, match=told) as error:
+        with_also(also)
+    assert "\n" not in str(error.value)
+
+
+def test_twins_beside_a_rig_are_refused():
+    with pytest.raises(RecipeError, match=r"camera\.also: expected none beside rig"):
+        with_also({"pinhole": PINHOLE}, rig={"kind": "stereo", "baseline": 0.1})
