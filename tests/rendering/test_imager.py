@@ -14,9 +14,11 @@ from viewsphere import Dataset, Recipe, generate, plan, plugins, render
 from viewsphere.check import check
 from viewsphere.codecs.srgb import encoded
 from viewsphere.errors import RecipeError, UserError
+from viewsphere.labels.shared.drawing.passes import picture
 from viewsphere.model.sensors.camera import Intrinsics
 from viewsphere.model.sensors.imager import SUNLIT, MountedImager
 from viewsphere.plugins.format import FormatSpec
+from viewsphere.preview.frame import draw_sample
 from viewsphere.recipe.cameras.imager import PRESETS
 from viewsphere.recipe.formats import FormatEntry
 from viewsphere.rendering.imager.metering import KEY, Reading, Settings
@@ -450,3 +452,12 @@ def test_formats_of_pictures_refuse_a_mosaic_alone_with_words(name):
         assert "expected" in str(error) and "found" in str(error) and len(str(error).splitlines()) == 1
     else:
         assert "rgb" not in (spec.channels or ())
+
+
+def test_a_mosaic_is_drawn_as_greys_up_to_its_largest_number():
+    (sample, *_) = render(recipe_of())
+    drawn = picture("bayer", sample.bayer)
+    assert (drawn.shape, drawn.dtype) == ((72, 96, 3), np.uint8)
+    expected = sample.bayer * (255 / sample.bayer.max())
+    assert np.abs(drawn - expected[..., None]).max() <= 0.51
+    assert draw_sample(sample).shape[2] == 3

@@ -8,14 +8,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewsphere.labels.shared.spec import Drawing, Picture
-from viewsphere.model.channel import PASSES, PICTURES, picture_of
+from viewsphere.model.channel import MOSAIC, PASSES, PICTURES, picture_of
 from viewsphere.model.sample import Sample
 from viewsphere.model.scene import ViewTransform
 from viewsphere.rendering.view import bytes_of_words, picture_of_light, to_bytes
 
 
 def picture(name: str, array: NDArray[Any]) -> Picture:
-    """A pass as a picture (H, W, 3) uint8: light developed as in pictures, albedo as sRGB, other shares as greys."""
+    """A pass as a picture (H, W, 3) uint8: light developed as in pictures, albedo as sRGB, other shares as greys, and digital
+    numbers as greys up to their largest.
+    """
+    if name == MOSAIC:
+        array = array / np.float32(max(int(array.max(initial=0)), 1))
     if array.dtype == np.uint16:
         return bytes_of_words(array)
     if PASSES[name].components == 1:
