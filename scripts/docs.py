@@ -22,6 +22,7 @@ from typing import Any, cast, get_args
 import numpy as np
 import site_links
 from figures import FIGURES, HISTORY
+from lens_pages import lens_page
 from typer.models import ArgumentInfo
 
 from viewsphere import plugins
@@ -184,6 +185,11 @@ surface, which all labels share, takes {:g}. Meanings and axes are in [channels 
 """
 
 
+def lenses_page() -> str:
+    """Every label of every lens; stops where figures are those of other lenses or formats."""
+    return NOTE + lens_page(json.loads((DOCS / "lenses.json").read_text("utf-8")), agree)
+
+
 def unit_of(label: LabelSpec) -> str:
     """The unit of a label, or those of its fields, each once."""
     units = [label.unit] if isinstance(label, ChannelLabel) else [field.unit for field in getattr(label, "fields", ())]
@@ -202,7 +208,8 @@ def agree(what: str, found: Collection[str], wanted: Collection[str]) -> None:
     """Stop where something is missing, or is there and should not be."""
     for problem, names in (("lacks", {*wanted} - {*found}), ("has no use for", {*found} - {*wanted})):
         if names:
-            sys.exit(f"docs/{what} {problem} {', '.join(sorted(names))}: run benchmarks/measure_labels (and --pictures)")
+            script = "measure_lenses" if what.startswith("lenses") else "measure_labels (and --pictures)"
+            sys.exit(f"docs/{what} {problem} {', '.join(sorted(names))}: run benchmarks/{script}")
 
 
 OPTIONS = re.compile(r"(<!-- options of (\w+), written by scripts/docs -->\n).*?(?=\n<!-- end -->)", re.DOTALL)
@@ -519,6 +526,7 @@ PAGES = {
     "channels.md": channels_page,
     "plugins.md": plugins_page,
     "proofs.md": proofs_page,
+    "lens-proofs.md": lenses_page,
     "formats.md": partial(options_page, "formats", "formats.md"),
     "formats-in.md": model_files_page,
     "asset-sets.md": asset_sets_page,

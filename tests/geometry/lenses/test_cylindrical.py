@@ -5,8 +5,17 @@ import math
 import numpy as np
 import pytest
 
+from formula_math import atan2, cos, sin, sqrt
+from published import Published
 from viewsphere.geometry.camera import pixel_rays
 from viewsphere.recipe.world.scene import CameraEntry
+
+PUBLISHED = Published(
+    cameras={"cylindrical": {"projection": "cylindrical", "size": [200, 96]}},
+    project=lambda own: lambda x, y, z: (atan2(x, z), y / sqrt(x * x + z * z)),
+    ray=lambda own: lambda x, y: (sin(x), y, cos(x)),
+    highest=math.tan(math.radians(89.9)),
+)
 
 
 def test_a_cylindrical_picture_has_equal_steps_of_azimuth_and_height():

@@ -1,10 +1,11 @@
 """The double sphere model against its formula in 40 digits (Usenko et al. 2018, equations 40 to 45)."""
 
-import mpmath
 import numpy as np
 import pytest
 
+from formula_math import sqrt
 from lens_proofs import LensProofs, assert_formula
+from published import Published
 from small import small_recipe
 from viewsphere import plan
 from viewsphere.errors import RecipeError
@@ -14,12 +15,18 @@ from viewsphere.model.sensors.camera import Intrinsics
 
 def formula(xi, alpha):
     def position(x, y, z):
-        first = mpmath.sqrt(x * x + y * y + z * z)
-        second = mpmath.sqrt(x * x + y * y + (xi * first + z) ** 2)
+        first = sqrt(x * x + y * y + z * z)
+        second = sqrt(x * x + y * y + (xi * first + z) ** 2)
         below = alpha * second + (1 - alpha) * (xi * first + z)
         return x / below, y / below
 
     return position
+
+
+PUBLISHED = Published(
+    cameras={"double sphere": {"focal_px": 40, "distortion": {"model": "double_sphere", "xi": -0.2, "alpha": 0.6}}},
+    project=lambda own: formula(own.xi, own.alpha),
+)
 
 
 class TestDoubleSphere(LensProofs):

@@ -7,6 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from formula_math import atan2, cos, sin, sqrt
+from published import Published
 from small import small_recipe
 from viewsphere import Recipe, plan
 from viewsphere.errors import RecipeError
@@ -16,6 +18,16 @@ from viewsphere.model.sensors.camera import Camera
 from viewsphere.recipe.world.scene import CameraEntry
 
 NAMES = ("equirectangular", "cylindrical")
+
+PUBLISHED = Published(
+    cameras={
+        "equirectangular": {"projection": "equirectangular", "size": [168, 84]},
+        "equirectangular 200 degrees": {"projection": "equirectangular", "span": {"horizontal": 200}},
+    },
+    project=lambda own: lambda x, y, z: (atan2(x, z), atan2(y, sqrt(x * x + z * z))),
+    ray=lambda own: lambda x, y: (cos(y) * sin(x), sin(y), cos(y) * cos(x)),
+    highest=math.pi / 2,
+)
 
 
 def lens(name, size, **span):

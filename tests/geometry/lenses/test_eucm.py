@@ -1,19 +1,26 @@
 """The enhanced unified model against its formula in 40 digits, and against COLMAP's EUCM."""
 
-import mpmath
 import numpy as np
 import pytest
 
+from formula_math import sqrt
 from lens_proofs import SIZE, LensProofs, assert_formula, directions_of, intrinsics
+from published import Published
 from viewsphere.geometry.lenses import lens_parameters
 
 
 def formula(alpha, beta):
     def position(x, y, z):
-        below = alpha * mpmath.sqrt(beta * (x * x + y * y) + z * z) + (1 - alpha) * z
+        below = alpha * sqrt(beta * (x * x + y * y) + z * z) + (1 - alpha) * z
         return x / below, y / below
 
     return position
+
+
+PUBLISHED = Published(
+    cameras={"EUCM": {"focal_px": 45, "distortion": {"model": "eucm", "alpha": 0.62, "beta": 1.15}}},
+    project=lambda own: formula(own.alpha, own.beta),
+)
 
 
 class TestEucm(LensProofs):

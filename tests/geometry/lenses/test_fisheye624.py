@@ -1,10 +1,11 @@
 """Project Aria's FISHEYE624 against its formula in 40 digits, pycolmap, and Project Aria's own tools where installed."""
 
-import mpmath
 import numpy as np
 import pytest
 
+from formula_math import atan2, sqrt
 from lens_proofs import SIZE, LensProofs, assert_formula, directions_of, intrinsics
+from published import Published
 from viewsphere.geometry.lenses import lens_parameters
 
 SLAM = (-0.0271, 0.0951, -0.0707, 0.0167, 0.0014, -0.0006, 0.00045, -0.00091, -0.0004, -0.0001, 0.0012, -0.0002)
@@ -13,8 +14,8 @@ SLAM = (-0.0271, 0.0951, -0.0707, 0.0167, 0.0014, -0.0006, 0.00045, -0.00091, -0
 
 def formula(k0, k1, k2, k3, k4, k5, p0, p1, s0, s1, s2, s3):
     def position(x, y, z):
-        r = mpmath.sqrt(x * x + y * y)
-        theta = mpmath.atan2(r, z)
+        r = sqrt(x * x + y * y)
+        theta = atan2(r, z)
         q = theta * theta
         bent = theta * (1 + k0 * q + k1 * q**2 + k2 * q**3 + k3 * q**4 + k4 * q**5 + k5 * q**6)
         x, y, s = bent * x / r, bent * y / r, bent * bent
@@ -22,6 +23,12 @@ def formula(k0, k1, k2, k3, k4, k5, p0, p1, s0, s1, s2, s3):
         return u, y + (2 * y * y + s) * p1 + 2 * x * y * p0 + s2 * s + s3 * s**2
 
     return position
+
+
+PUBLISHED = Published(
+    cameras={"FISHEYE624": {"focal_px": 48, "distortion": {"model": "fisheye624", "coefficients": SLAM}}},
+    project=lambda own: formula(*own.coefficients),
+)
 
 
 class TestFisheye624(LensProofs):

@@ -1,21 +1,28 @@
 """The FOV model against its formula in 40 digits, and against COLMAP's FOV."""
 
-import mpmath
 import numpy as np
 import pytest
 
+from formula_math import atan, sqrt, tan
 from lens_proofs import SIZE, LensProofs, assert_formula, directions_of, intrinsics
+from published import Published
 from viewsphere.geometry.lenses import lens_parameters
 
 
 def formula(omega):
     def position(x, y, z):
         x, y = x / z, y / z
-        r = mpmath.sqrt(x * x + y * y)
-        bent = mpmath.atan(2 * r * mpmath.tan(mpmath.mpf(omega) / 2)) / omega
+        r = sqrt(x * x + y * y)
+        bent = atan(2 * r * tan(omega / 2 + 0 * r)) / omega
         return x * bent / r, y * bent / r
 
     return position
+
+
+PUBLISHED = Published(
+    cameras={"FOV": {"focal_px": 70, "distortion": {"model": "fov", "omega": 0.9}}},
+    project=lambda own: formula(own.omega),
+)
 
 
 class TestFov(LensProofs):

@@ -1,10 +1,11 @@
 """OpenCV's whole model against cv2 itself, and against its formula in 40 digits."""
 
-import mpmath
 import numpy as np
 import pytest
 
+from formula_math import cos, sin
 from lens_proofs import LensProofs, assert_formula, directions_of, intrinsics
+from published import Published
 from small import small_recipe
 from viewsphere import plan
 from viewsphere.errors import RecipeError
@@ -20,15 +21,21 @@ def formula(k1, k2, p1, p2, k3, k4, k5, k6, s1, s2, s3, s4, tx=0, ty=0):
         radial = (1 + k1 * s + k2 * s**2 + k3 * s**3) / (1 + k4 * s + k5 * s**2 + k6 * s**3)
         u = x * radial + 2 * p1 * x * y + p2 * (s + 2 * x * x) + s1 * s + s2 * s**2
         v = y * radial + 2 * p2 * x * y + p1 * (s + 2 * y * y) + s3 * s + s4 * s**2
-        cx, sx, cy, sy = mpmath.cos(tx), mpmath.sin(tx), mpmath.cos(ty), mpmath.sin(ty)
-        about_x = mpmath.matrix([[1, 0, 0], [0, cx, sx], [0, -sx, cx]])
-        about_y = mpmath.matrix([[cy, 0, -sy], [0, 1, 0], [sy, 0, cy]])
-        turned = about_y * about_x
-        ahead = mpmath.matrix([[turned[2, 2], 0, -turned[0, 2]], [0, turned[2, 2], -turned[1, 2]], [0, 0, 1]])
-        at = ahead * turned * mpmath.matrix([u, v, 1])
-        return at[0] / at[2], at[1] / at[2]
+        (cx, sx), (cy, sy) = ((cos(tilt + 0 * s), sin(tilt + 0 * s)) for tilt in (tx, ty))
+        about_x, about_y = ((1, 0, 0), (0, cx, sx), (0, -sx, cx)), ((cy, 0, -sy), (0, 1, 0), (sy, 0, cy))
+        turned = [[sum(about_y[i][k] * about_x[k][j] for k in range(3)) for j in range(3)] for i in range(3)]
+        a, b, w = (row[0] * u + row[1] * v + row[2] for row in turned)
+        (_, _, x2), (_, _, y2), (_, _, z2) = turned
+        return (z2 * a - x2 * w) / w, (z2 * b - y2 * w) / w
 
     return position
+
+
+TILTED = {"model": "thin_prism", "coefficients": (*K, 0.08, -0.15)}
+PUBLISHED = Published(
+    cameras={"OpenCV tilted thin prism": {"focal_px": 110, "distortion": TILTED}},
+    project=lambda own: formula(*own.coefficients),
+)
 
 
 class TestThinPrism(LensProofs):

@@ -1,10 +1,11 @@
 """COLMAP's THIN_PRISM_FISHEYE against its formula in 40 digits, and against pycolmap."""
 
-import mpmath
 import numpy as np
 import pytest
 
+from formula_math import atan2, sqrt
 from lens_proofs import SIZE, LensProofs, assert_formula, directions_of, intrinsics
+from published import Published
 from small import small_recipe
 from viewsphere import plan
 from viewsphere.errors import RecipeError
@@ -15,14 +16,20 @@ K = (0.03, -0.005, 0.002, -0.001, 0.001, -0.0002, 0.003, -0.002)
 
 def formula(k1, k2, p1, p2, k3, k4, sx, sy):
     def position(x, y, z):
-        r = mpmath.sqrt(x * x + y * y)
-        theta = mpmath.atan2(r, z)
+        r = sqrt(x * x + y * y)
+        theta = atan2(r, z)
         x, y, s = theta * x / r, theta * y / r, theta * theta
         radial = 1 + k1 * s + k2 * s**2 + k3 * s**3 + k4 * s**4
         u = x * radial + 2 * p1 * x * y + p2 * (s + 2 * x * x) + sx * s
         return u, y * radial + 2 * p2 * x * y + p1 * (s + 2 * y * y) + sy * s
 
     return position
+
+
+PUBLISHED = Published(
+    cameras={"thin prism fisheye": {"focal_px": 45, "distortion": {"model": "thin_prism_fisheye", "coefficients": K}}},
+    project=lambda own: formula(*own.coefficients),
+)
 
 
 class TestThinPrismFisheye(LensProofs):

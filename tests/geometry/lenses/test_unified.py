@@ -1,22 +1,30 @@
 """The unified model against its formula in 40 digits, and against OpenCV's omnidir where the installed OpenCV has it."""
 
-import mpmath
 import numpy as np
 import pytest
 
+from formula_math import sqrt
 from lens_proofs import LensProofs, assert_formula, directions_of, intrinsics
+from published import Published
 from viewsphere.geometry.lenses import lens_parameters
 
 
 def formula(xi, k1, k2, p1, p2):
     def position(x, y, z):
-        below = z + xi * mpmath.sqrt(x * x + y * y + z * z)
+        below = z + xi * sqrt(x * x + y * y + z * z)
         x, y = x / below, y / below
         s = x * x + y * y
         radial = 1 + k1 * s + k2 * s * s
         return x * radial + 2 * p1 * x * y + p2 * (s + 2 * x * x), y * radial + 2 * p2 * x * y + p1 * (s + 2 * y * y)
 
     return position
+
+
+OMNIDIR = {"model": "unified", "xi": 1.2, "coefficients": (-0.2, 0.1, 0.001, -0.002)}
+PUBLISHED = Published(
+    cameras={"unified (omnidir)": {"focal_px": 90, "distortion": OMNIDIR}},
+    project=lambda own: formula(own.xi, *own.coefficients),
+)
 
 
 class TestUnified(LensProofs):
