@@ -259,7 +259,7 @@ def _sized(found: Calibrated, lens: Intrinsics) -> Intrinsics:
     """The calibrated lens; with the recipe's size if the calibration has none."""
     width, height = found.size or (lens.width, lens.height)
     with told_of(f"rig: sensor {found.name}"):
-        return Intrinsics(width=width, height=height, **found.lens, distortion=found.distortion)
+        return Intrinsics(width=width, height=height, **found.lens, distortion=found.distortion, rolling=None)
 
 
 def _check_disparity(recipe: Recipe, rig: Rig) -> None:

@@ -160,7 +160,7 @@ def _frame(scene: Path, image: int, said: dict[str, Any], gt: list[Any], info: l
         rgb=rgb,
         depth=depth if depth.is_file() else None,
         step=step,
-        camera=Camera(Intrinsics(width=width, height=height, **lens), pose[:3, :3], pose[:3, 3]),
+        camera=Camera(Intrinsics(width=width, height=height, **lens, rolling=None), pose[:3, :3], pose[:3, 3]),
         gt=tuple(gt),
         info=tuple(_checked(one) for one in info),
     )

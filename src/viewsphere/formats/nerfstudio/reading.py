@@ -176,4 +176,4 @@ def lens_of(said: Mapping[str, Any], size: tuple[int, int]) -> Intrinsics:
         raise ValueError(f"expected lenses without k4; found {k4:g}: undistort the pictures first")
     elif any((k1, k2, k3, p1, p2)):
         bent = opencv_parameters((k1, k2, p1, p2, k3) if k3 else (k1, k2, p1, p2))
-    return Intrinsics(**size_of, fx=fx, fy=fy, cx=cx, cy=cy, distortion=bent)
+    return Intrinsics(**size_of, fx=fx, fy=fy, cx=cx, cy=cy, distortion=bent, rolling=None)

@@ -75,7 +75,7 @@ def _lens(given: Mapping[str, Any], where: str) -> Intrinsics | None:
         if model in OWN:
             return Intrinsics(**size, **own_lens(model, matrix, given["distortion_params"] or ())._asdict())
         bent = _distortion(model, values, where)
-        return Intrinsics(**size, fx=matrix[0], fy=matrix[1], cx=matrix[2], cy=matrix[3], distortion=bent)
+        return Intrinsics(**size, fx=matrix[0], fy=matrix[1], cx=matrix[2], cy=matrix[3], distortion=bent, rolling=None)
 
 
 def _distortion(model: object, values: Mapping[str, float], where: str) -> LensParameters | None:
