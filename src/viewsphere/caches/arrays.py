@@ -40,7 +40,7 @@ MOUNTS = Path("/proc/self/mounts")
 
 MAGIC = b"VSA1"
 MAPPED_BYTES = 1 << 16 if sys.platform == "linux" else 1 << 20
-"""Size in bytes from which a file is mapped. On Linux, files of at least 64 kB hold 98 % of the bytes of a town's models.
+"""Size in bytes from which a file is mapped. On Linux, most bytes of a town's models are in files of at least 64 kB.
 Elsewhere each mapping holds an open file, and a process may have 1,024 of them. Truncating a mapped file in place ends the
 processes that map it; viewsphere itself only replaces and deletes files.
 """
