@@ -22,8 +22,8 @@ from viewsphere.truth.raster.kernels_row import draw_four_along
 
 U = nb.uintp
 LEAF = 8  # pixels along a leaf's side
-MANY_CELLS = 256  # cells of a triangle's box, beyond which searching the whole picture is faster than reading them
-FEW_PIXELS = 128  # pixels of a triangle's box, up to which testing each is faster than searching the tree
+MANY_CELLS = 256  # cells of a box, beyond which searching all rows is faster than reading them; measured on eight zoo models
+FEW_PIXELS = 128  # pixels of a box, up to which testing each is faster than searching the tree; measured on eight zoo models
 WIDER = 1e-9  # widening of a ray on a face: more than the rounding of a projection
 BITS = 12  # bits of a row or a column of cells in a vertex's place
 NOWHERE = -1  # place of a vertex that is on none of the faces
