@@ -60,10 +60,8 @@ PRESETS: Mapping[str, Mapping[str, Any]] = MappingProxyType(
 a base ISO that is not named here is nominal.
 
 phone: Sony IMX363 of Google's Pixel 4a. Full well, read noise, black level, bits, f-number and ISO of unit gain are those of
-ISETCam's model (https://github.com/ISET/isetcam, `sensorIMX363V2.m`), validated against the phone by Lyu et al., *Validation of
-image systems simulation technology using a Cornell Box* (2021, arXiv:2105.04106). Brooks et al., *Unprocessing Images for
-Learned Raw Denoising* (2019, section 3.1) fits phones with 0.8 electrons at this gain. Colours: Sony IMX378 of earlier
-Pixels.
+ISETCam's model (https://github.com/ISET/isetcam, `sensorIMX363V2.m`); its read noise is the model's, not known to be measured.
+Colours: Sony IMX378 of earlier Pixels.
 webcam: Sony IMX477 of Raspberry Pi's High Quality Camera, measured in *Pi HQ Cam Sensor Performance*
 (https://www.strollswithmydog.com): 8,180 electrons, 0.47 DN per electron, black 256, read noise
 3 electrons at gain 1 and 1.5 at gain 16, the largest.
@@ -71,7 +69,7 @@ machine_vision: Sony IMX250, measured by MATRIX VISION by EMVA 1288 in the mvBlu
 (https://www.matrix-vision.com/manuals/mvBlueFOX3/mvBC_subsubsection_sensors_CMOS_models_2051.html): SNR 40.3 dB, whose
 square is the full well, and dynamic range 71.2 dB, from which the read noise follows. Black level and colours: Sony IMX296,
 which has the same pixels.
-drone: Sony IMX183, of one inch, measured by FLIR by EMVA 1288 in the BFS-U3-200S6M: 14,837 electrons, dynamic range 11.93 bits.
+drone: Sony IMX183, of one inch, by FLIR's EMVA 1288 figures of the BFS-U3-200S6M, as quoted by others: 14,837 electrons, dynamic range 11.93 bits.
 Black level and colours: Sony IMX283, of the same size, with the same pixels.
 
 The read noise s of a dynamic range is that of EMVA 1288: the threshold, full well / range, is 1/2 + sqrt(1/4 + s^2) electrons.
