@@ -69,7 +69,8 @@ machine_vision: Sony IMX250, measured by MATRIX VISION by EMVA 1288 in the mvBlu
 (https://www.matrix-vision.com/manuals/mvBlueFOX3/mvBC_subsubsection_sensors_CMOS_models_2051.html): SNR 40.3 dB, whose
 square is the full well, and dynamic range 71.2 dB, from which the read noise follows. Black level and colours: Sony IMX296,
 which has the same pixels.
-drone: Sony IMX183, of one inch, by FLIR's EMVA 1288 figures of the BFS-U3-200S6M, as quoted by others: 14,837 electrons, dynamic range 11.93 bits.
+drone: Sony IMX183, of one inch, by FLIR's EMVA 1288 figures of the BFS-U3-200S6M, as quoted by others: 14,837
+electrons, dynamic range 11.93 bits.
 Black level and colours: Sony IMX283, of the same size, with the same pixels.
 
 The read noise s of a dynamic range is that of EMVA 1288: the threshold, full well / range, is 1/2 + sqrt(1/4 + s^2) electrons.
