@@ -79,7 +79,7 @@ FISHEYE = {"model": "fisheye", "coefficients": [0, 0, 0, 0]}
         ({"time": {"frames": 3, "fps": 13}}, "camera.rolling.readout: expected at most 0.0769231 s"),
         ({"time": {"frames": 3, "fps": 10, "shutter": 0.2}}, "time.shutter: expected 0 beside camera.rolling; found 0.2"),
         ({"channels": ["rgb", "flow"]}, "channels: flow: expected no camera.rolling beside it"),
-        ({"annotations": ["keypoints"]}, "annotations: keypoints: expected no camera.rolling beside it"),
+        ({"channels": ["rgb", "voxels"]}, "channels: voxels: expected no camera.rolling beside it"),
         ({"engine": "cycles"}, "engine: expected one that paints rolling shutters"),
         ({"scene": {"ground": True, "rain": 5}}, "scene.rain: expected off beside camera.rolling"),
         ({"camera": {"size": [96, 72], "fov_deg": 45, "rolling": {"readout": 0.05}, "distortion": FISHEYE}}, "a pinhole"),
@@ -95,8 +95,8 @@ def test_what_it_rules_out_is_one_line_before_rendering(changes, told):
 
 
 def test_labels_that_compare_views_require_one_pose():
-    """A label that reads another view of the sequence, or points in a view, cannot be computed for rows with poses."""
-    compared = {"Next", "Previous", "Partner", "OwnView", "ObjectPoints", "FollowedPoints"}
+    """A label that reads another view of the sequence, or points of whole objects, cannot be computed for rows with poses."""
+    compared = {"Next", "Previous", "Partner", "ObjectPoints"}
     for name, label in labels().items():
         if compared & {type(need).__name__ for need in label.needs}:
             assert label.one_pose, name

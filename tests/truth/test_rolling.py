@@ -8,49 +8,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from rolling_scenes import at, at_row, rolling_camera, shown_rows
 from truth_scenes import cube, lens, orbit_camera, placed, random_soup, sphere
 from viewsphere.geometry.rotation import rotation_about
 from viewsphere.model.sensors.camera import Camera
 from viewsphere.model.sensors.rolling import Rolling, RowPoses
-from viewsphere.truth.raster.geometry import Geometry
 from viewsphere.truth.raster.rolling import pixels_in_rows
 from viewsphere.truth.raster.visibility import rasterize
-
-
-def at(x: float, y: float, z: float) -> np.ndarray:
-    pose = np.eye(4)
-    pose[:3, 3] = x, y, z
-    return pose
-
-
-def swung(start: np.ndarray, height: int, rng: np.random.Generator, turn: float, shift: float) -> np.ndarray:
-    """Poses (H, 4, 4) around a pose: a turn and a shift, both even in time."""
-    axis, way, out = rng.normal(size=3), rng.normal(size=3) * shift, np.tile(np.eye(4), (height, 1, 1))
-    for i, share in enumerate(np.linspace(-0.5, 0.5, height)):
-        out[i, :3, :3] = rotation_about(axis / np.linalg.norm(axis) * turn * share) @ start[:3, :3]
-        out[i, :3, 3] = start[:3, 3] + way * share
-    return out
-
-
-def rolling_camera(camera: Camera, geometry: Geometry, rng, turn=0.3, shift=0.3, moving=()) -> Camera:
-    pose = np.eye(4)
-    pose[:3, :3], pose[:3, 3] = camera.R.T, camera.center
-    placed = swung(pose, camera.height, rng, turn, shift)
-    rotation = np.ascontiguousarray(placed[:, :3, :3].swapaxes(1, 2))
-    shifts = -np.einsum("hij,hj->hi", rotation, placed[:, :3, 3])
-    things = {i: swung(geometry.poses[i], camera.height, rng, turn, shift) for i in moving}
-    return replace(camera, rows=RowPoses(rotation, shifts, things))
-
-
-def at_row(geometry: Geometry, camera: Camera, row: int) -> tuple[Geometry, Camera]:
-    """The still world and camera of a row."""
-    assert camera.rows is not None
-    poses = geometry.poses.copy()
-    for i, own in camera.rows.moving.items():
-        poses[i] = own[row]
-    bounds = np.tile([[-1e3], [1e3]], (len(poses), 1, 3))  # nothing is left out
-    still = replace(geometry, poses=poses, bounds=bounds)
-    return still, Camera(camera.intrinsics, camera.rows.rotation[row], camera.rows.translation[row])
 
 
 @pytest.mark.parametrize("seed", range(8))
@@ -114,21 +78,6 @@ def test_a_spinning_camera_slants_a_vertical_pole():
     assert abs(edge[0] - edge[-1]) > 7
 
 
-def shown_rows(camera: Camera, pose: np.ndarray, point: np.ndarray) -> list[tuple[float, float]]:
-    """All places at which rows show a point of a still thing, between neighbouring rows, and beyond the ends."""
-    rows = camera.rows
-    world = pose[:3, :3] @ point + pose[:3, 3]
-    seen = np.array([camera.K @ (turn @ world + shift) for turn, shift in zip(rows.rotation, rows.translation, strict=True)])
-    x, y, w = seen[:, 0] / seen[:, 2], seen[:, 1] / seen[:, 2], seen[:, 2]
-    off, found = y - (np.arange(len(y)) + 0.5), []
-    for r in range(len(y) - 1):
-        if w[r] > 0 and w[r + 1] > 0 and off[r] * off[r + 1] <= 0:
-            share = off[r] / (off[r] - off[r + 1])
-            found.append((x[r] + share * (x[r + 1] - x[r]), r + 0.5 + share))
-    found += [(x[0], y[0])] if w[0] > 0 and off[0] <= 0 else []
-    return found + ([(x[-1], y[-1])] if w[-1] > 0 and off[-1] >= 0 else [])
-
-
 @pytest.mark.parametrize(("turn", "shift"), [(0.02, 0.02), (0.4, 0.3), (3.0, 1.0), (9.0, 2.0)])
 def test_a_point_is_where_the_row_nearest_to_the_instant_shows_it(turn, shift):
     """Slow motions show each point once; fast ones several times, or never."""
@@ -141,7 +90,7 @@ def test_a_point_is_where_the_row_nearest_to_the_instant_shows_it(turn, shift):
         points = rng.normal(size=(60, 3)) * 0.8
         found, z = pixels_in_rows(camera, camera.rows, 0, geometry.poses[0], points)
         for own, depth, point in zip(found, z, points, strict=True):
-            places = shown_rows(camera, geometry.poses[0], point)
+            places = shown_rows(camera, np.tile(geometry.poses[0], (camera.height, 1, 1)), point)
             counts.add(len(places))
             assert np.isnan(own).all() == (not places) == np.isnan(depth)
             if places:

@@ -165,6 +165,13 @@ def rigid(rotation: ArrayLike, translation: ArrayLike) -> Float:
     return matrix
 
 
+def inverse_pose(pose: ArrayLike) -> Float:
+    """The inverse (4, 4) of a pose (4, 4)."""
+    known = np.asarray(pose, np.float64)
+    turned = inverse(known[:3, :3])
+    return rigid(turned, -transform(turned, known[:3, 3]))
+
+
 def compose(a: ArrayLike, b: ArrayLike) -> Float:
     """The affine motion `b` followed by `a`, (4, 4) each; no BLAS, as in `transform`."""
     a, b = np.asarray(a, np.float64), np.asarray(b, np.float64)

@@ -6,17 +6,15 @@ from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from viewsphere.geometry.box3d import Box3d
 from viewsphere.geometry.camera import project
 from viewsphere.geometry.rotation import rigid, transform
 from viewsphere.labels.shared.drawing.colors import color_of
 from viewsphere.labels.shared.placement import Placement
+from viewsphere.labels.shared.point_checks import pixels_of_rows
 from viewsphere.labels.shared.spec import Drawing, Field, Models, ObjectLabel, rendered
 from viewsphere.model.sample import ObjectAnnotation, Sample
-from viewsphere.model.sensors.camera import Camera
-from viewsphere.model.sensors.rolling import RowPoses
 
 if TYPE_CHECKING:
     from PIL.ImageDraw import ImageDraw
@@ -65,7 +63,7 @@ def _projected(sample: Sample, o: ObjectAnnotation) -> Iterator[str]:
         yield f"object {o.id}: expected vertices in front {in_front.tolist()}, found {o.box3d_in_front.tolist()}"
         return
     if camera.rows is not None:
-        expected = _in_rows(camera, camera.rows, o)
+        expected = pixels_of_rows(camera, camera.rows, o, o.box3d_object)
     elif camera.lens.is_straight:
         expected = np.full((8, 2), np.nan)
         expected[in_front] = homogeneous[in_front, :2] / homogeneous[in_front, 2:]
@@ -75,31 +73,6 @@ def _projected(sample: Sample, o: ObjectAnnotation) -> Iterator[str]:
     limit = PIXEL_TOLERANCE * (1 + np.abs(np.nan_to_num(expected)) / 1e4)
     if not np.array_equal(np.isnan(expected), np.isnan(o.box3d_pixels)) or (off > limit).any():
         yield f"object {o.id}: box3d_pixels is up to {np.nanmax(off, initial=0):.3g} px off P x vertex"
-
-
-def _in_rows(camera: Camera, rows: RowPoses, o: ObjectAnnotation) -> NDArray[np.float64]:
-    """box3d_pixels under a rolling shutter, written out here: of the rows that meet a corner, the nearest to the middle."""
-    height, row = len(rows.rotation), np.arange(len(rows.rotation)) + 0.5
-    poses = rows.moving.get(o.id - 1, np.tile(o.world_from_object, (height, 1, 1)))
-    world = np.einsum("hij,nj->hni", poses[:, :3, :3], o.box3d_object) + poses[:, None, :3, 3]
-    seen = np.einsum("hij,hnj->hni", rows.rotation, world) + rows.translation[:, None]
-    homogeneous = np.einsum("ij,hnj->hni", camera.K, seen)
-    expected = np.full((8, 2), np.nan)
-    for k in range(8):
-        u, v, w = homogeneous[:, k].T
-        with np.errstate(divide="ignore", invalid="ignore"):
-            x, y = u / w, v / w
-        off, places = y - row, list[tuple[float, float]]()
-        for r in np.flatnonzero((w[:-1] > 0) & (w[1:] > 0) & (off[:-1] * off[1:] <= 0)).tolist():
-            share = off[r] / (off[r] - off[r + 1])
-            places.append((x[r] + share * (x[r + 1] - x[r]), row[r] + share))
-        if w[0] > 0 and off[0] <= 0:
-            places.append((x[0], y[0]))
-        if w[-1] > 0 and off[-1] >= 0:
-            places.append((x[-1], y[-1]))
-        if places:
-            expected[k] = min(places, key=lambda place: abs(place[1] - height / 2))
-    return expected
 
 
 def _draw(pen: ImageDraw, sample: Sample, scale: float) -> None:

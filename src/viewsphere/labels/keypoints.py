@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from functools import partial
 from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
@@ -10,18 +12,21 @@ from numpy.typing import NDArray
 from pydantic import Field as Limits
 
 from viewsphere.geometry.camera import project
-from viewsphere.geometry.rotation import transform
+from viewsphere.geometry.rotation import inverse_pose, transform
 from viewsphere.labels.shared.drawing.colors import color_of
 from viewsphere.labels.shared.field import Field
 from viewsphere.labels.shared.needs import OwnView
 from viewsphere.labels.shared.placement import Placement
+from viewsphere.labels.shared.point_checks import pixels_of_rows
 from viewsphere.labels.shared.spec import Drawing, Models, ObjectLabel, rendered
 from viewsphere.model.fields.frozen import Frozen
 from viewsphere.model.fields.numbers import Number
 from viewsphere.model.sample import ObjectAnnotation, Sample
 from viewsphere.model.sensors.camera import Camera
 from viewsphere.truth.surface_points.points import points_in_world
-from viewsphere.truth.surface_points.raster import BEHIND, OCCLUDED, OUTSIDE, VISIBLE
+from viewsphere.truth.surface_points.raster import BEHIND, OCCLUDED, OUTSIDE, VISIBLE, Placed, states
+from viewsphere.truth.surface_points.rolling import placed_in_rows
+from viewsphere.truth.view import View
 
 if TYPE_CHECKING:
     from PIL.ImageDraw import ImageDraw
@@ -52,8 +57,8 @@ def _compute(context: LabelContext, i: int) -> Mapping[str, Any]:
     """Return every field of the object's points, in the order of its model's points; a model without points gives empty
     fields.
     """
-    states = context.once("keypoints", lambda: _states(context))
-    return _fields(context.placement(i), states[i])
+    found = context.once("keypoints", lambda: _states(context))
+    return _fields(context.placement(i), found[i])
 
 
 def _states(context: LabelContext) -> dict[int, tuple[int, ...]]:
@@ -64,6 +69,8 @@ def _states(context: LabelContext) -> dict[int, tuple[int, ...]]:
     view, slack = context.get(OwnView()), context.options_of("keypoints", _Options).depth_slack
     if view is None:
         raise ValueError("keypoints: expected a sample of a shot, found none")
+    if view.camera.rows is not None:
+        return _states_in_rows(view, context.placements, slack)
     found, places = dict[int, int](), list[Float]()
     for i, placement in enumerate(context.placements):
         if placement is not None:
@@ -77,9 +84,25 @@ def _states(context: LabelContext) -> dict[int, tuple[int, ...]]:
             found[i] = len(away)
     if not places:
         return {}
-    states: list[int] = points_in_world(np.concatenate(places)).in_view(view).state.tolist() if sum(found.values()) else []
+    of_all: list[int] = points_in_world(np.concatenate(places)).in_view(view).state.tolist() if sum(found.values()) else []
     ends = np.cumsum([*found.values()]).tolist()
-    return {i: tuple(states[end - count : end]) for (i, count), end in zip(found.items(), ends, strict=True)}
+    return {i: tuple(of_all[end - count : end]) for (i, count), end in zip(found.items(), ends, strict=True)}
+
+
+def _states_in_rows(view: View, placements: Sequence[Placement | None], slack: float) -> dict[int, tuple[int, ...]]:
+    """`_states` under a rolling shutter: each point is tested as the camera sees it at the time of its row."""
+    found, placed = list[int](), list[Placed]()
+    for i, placement in enumerate(placements):
+        if placement is not None:
+            points = _in_world(placement)
+            thing, none = np.full(len(points), i), np.full(len(points), -1, np.int32)
+            seen = placed_in_rows(view, points, thing, partial(np.copy, none), np.zeros(len(points), np.bool_))
+            assert seen.rays is not None
+            length = np.sqrt((seen.rays * seen.rays).sum(axis=1))
+            share = np.fmin(slack * (placement.facts.diameter or 0.0) * seen.near / length, NEAREST)  # NaN without a pixel
+            found.append(i)
+            placed.append(replace(seen, near=seen.near / (1 - share)))
+    return {i: tuple(state.tolist()) for i, state in zip(found, states(placed), strict=True)} if placed else {}
 
 
 def _ray_origins(camera: Camera, points: Float) -> Float:
@@ -99,16 +122,23 @@ def _in_world(placement: Placement) -> Float:
     return transform(placement.world_from_object, _in_object(placement))
 
 
-def _fields(placement: Placement, states: Any) -> Mapping[str, Any]:
+def _fields(placement: Placement, known_states: Any) -> Mapping[str, Any]:
     known, in_world = placement.facts.keypoints, _in_world(placement)
     in_camera = transform(placement.camera_from_world, in_world)
     return {
         "keypoint_names": tuple(known.points) if known else (),
-        "keypoints": project(placement.camera.intrinsics, in_camera)[0],
+        "keypoints": _pixels(placement, in_camera),
         "keypoints3d": in_world,
         "keypoints3d_camera": in_camera,
-        "keypoint_states": np.array(states, np.int64),
+        "keypoint_states": np.array(known_states, np.int64),
     }
+
+
+def _pixels(placement: Placement, in_camera: Float) -> Float:
+    """The pixels (n, 2) of the model's points, which are at these places in the camera's axes at the instant."""
+    if placement.camera.rows is not None:
+        return placement.pixels(_in_object(placement))
+    return project(placement.camera.intrinsics, in_camera)[0]
 
 
 def _restore(kept: Any, placement: Placement, o: ObjectAnnotation) -> Mapping[str, Any]:
@@ -136,20 +166,22 @@ def _prove(sample: Sample, models: Models) -> Iterator[str]:
 
 
 def _seen(sample: Sample, o: ObjectAnnotation) -> Iterator[str]:
-    camera, states = sample.camera, o.keypoint_states
+    camera, state = sample.camera, o.keypoint_states
     in_camera = transform(camera.R, o.keypoints3d) + camera.t
     if np.abs(in_camera - o.keypoints3d_camera).max(initial=0) > TOLERANCE * (1 + float(np.abs(in_camera).max(initial=0))):
         yield f"object {o.id}: expected keypoints3d_camera as the camera sees keypoints3d, found others"
     pixels, found = project(camera.intrinsics, o.keypoints3d_camera)[0], o.keypoints
+    if camera.rows is not None:
+        pixels = pixels_of_rows(camera, camera.rows, o, transform(inverse_pose(o.world_from_object), o.keypoints3d))
     has_pixel = ~np.isnan(found).any(axis=1)
     off = np.abs(pixels - found) > EDGE * (1 + np.abs(np.nan_to_num(pixels)) / 1e3)
     if off.any() or not np.array_equal(np.isnan(pixels), np.isnan(found)):
         yield f"object {o.id}: expected keypoints where the camera shows keypoints3d, found others"
         return
     inside = np.minimum(found, (camera.width, camera.height) - found).min(axis=1, initial=np.inf)
-    known = np.isin(states, (VISIBLE, OCCLUDED, OUTSIDE, BEHIND))
-    wrong = ~known | (has_pixel == (states == BEHIND))
-    wrong |= has_pixel & (np.abs(inside) > EDGE) & ((inside < 0) != (states == OUTSIDE))
+    known = np.isin(state, (VISIBLE, OCCLUDED, OUTSIDE, BEHIND))
+    wrong = ~known | (has_pixel == (state == BEHIND))
+    wrong |= has_pixel & (np.abs(inside) > EDGE) & ((inside < 0) != (state == OUTSIDE))
     if wrong.any():
         yield f"object {o.id}: expected states that fit the pixels of its points, found others of {wrong.sum()}"
 
@@ -171,7 +203,6 @@ LABEL = ObjectLabel(
     meaning="its model's named points",
     on_request=True,
     needs=(OwnView(),),
-    one_pose=True,
     options=_Options,
     fields=(
         Field("keypoint_names", "names of the points; the data set's models have skeletons and flips, too", str, many=True),

@@ -16,6 +16,7 @@ from viewsphere.labels.shared.field import Field
 from viewsphere.labels.shared.placement import Placement
 from viewsphere.labels.shared.spec import Drawing, Models, ObjectLabel, rendered
 from viewsphere.model.sample import ObjectAnnotation, Sample
+from viewsphere.truth.raster.rolling import pixels_in_rows
 
 if TYPE_CHECKING:
     from PIL.ImageDraw import ImageDraw
@@ -37,6 +38,10 @@ def _compute(context: LabelContext, i: int) -> Mapping[str, Any]:
 def _projected(context: LabelContext, i: int) -> Any:
     g, camera = context.geometry, context.camera
     own = slice(g.vertex_start[i], g.vertex_start[i + 1])
+    if camera.rows is not None:
+        points = g.coordinates[own][g.is_used[own]].astype(np.float64)
+        pixels, z = pixels_in_rows(camera, camera.rows, i, g.poses[i], points)
+        return smallest_rectangle(convex_hull(pixels)) if len(pixels) and (z > 0).all() else None
     vertices = g.places(i)[g.is_used[own]]
     in_camera = transform(rigid(camera.R, camera.t), vertices)
     pixels, _ = project(camera.intrinsics, in_camera)
@@ -118,7 +123,6 @@ LABEL = ObjectLabel(
     meaning="its smallest oriented rectangles",
     axes="image",
     on_request=True,
-    one_pose=True,
     fields=(
         Field("obb", f"{_CORNERS}: around its visible pixels; None without any", float, (4, 2), "px", "", True, True),
         Field(

@@ -10,14 +10,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewsphere.geometry.camera import project
-from viewsphere.geometry.rotation import transform
+from viewsphere.geometry.rotation import inverse_pose, transform
 from viewsphere.labels.shared.ids import in_column
 from viewsphere.labels.shared.needs import FollowedPoints
 from viewsphere.labels.shared.spec import ChannelLabel, Color, Drawing, Models, channel_of
 from viewsphere.model.annotations.tracks import TRACK
 from viewsphere.model.sample import Sample
+from viewsphere.model.sensors.rolling import RowPoses
+from viewsphere.truth.raster.rolling import pixels_in_rows
 from viewsphere.truth.surface_points.points import SKY
 from viewsphere.truth.surface_points.raster import OCCLUDED, VISIBLE
+from viewsphere.truth.surface_points.rolling import when_shown
 
 if TYPE_CHECKING:
     from PIL.ImageDraw import ImageDraw
@@ -42,6 +45,9 @@ def _compute(context: LabelContext) -> NDArray[np.void]:
     now = followed.points.in_view(own)
     out, point = followed.rows.copy(), np.ones((len(followed.query), 4))
     point[:, :3] = now.world
+    if own.camera.rows is not None:  # objects have poses in the sample from which their motion follows, scenery has none
+        scenery = np.where(now.moving >= own.geometry.object_count, now.moving, np.int32(-1))
+        point[:, :3] = when_shown(own, now.world, scenery, now.xy[:, 1])
     sky = np.flatnonzero(followed.points.body == SKY)
     point[sky, :3], point[sky, 3] = followed.points.place[sky], 0.0
     point[np.isnan(point[:, 0])] = np.nan
@@ -93,8 +99,27 @@ def _whole_end(places: list[tuple[float, float]]) -> list[tuple[float, float]]:
 
 
 def positions(sample: Sample) -> NDArray[np.float64]:
-    """Return the positions of a sample's points in its picture, (N, 2) pixels; NaN where its lens does not show them."""
+    """Return the positions of a sample's points in its picture, (N, 2) pixels; NaN where its lens does not show them. Under a
+    rolling shutter, they are those nearest in time to the instant.
+    """
+    if sample.camera.rows is not None:
+        return _positions_in_rows(sample, sample.camera.rows)
     return project(sample.camera.intrinsics, in_camera(sample))[0]
+
+
+def _positions_in_rows(sample: Sample, rows: RowPoses) -> NDArray[np.float64]:
+    tracks, known = sample.channels["tracks"], {o.id: o for o in sample.objects if o.id - 1 in rows.moving}
+    point, owner = tracks["point"], np.where(np.isin(tracks["object"], [*known]), tracks["object"], 0)
+    xy, is_there = np.full((len(point), 2), np.nan), ~np.isnan(point[:, 0])
+    far = point[:, 3] == 0.0
+    for of_object in np.unique(owner[is_there & ~far]).tolist():
+        at = is_there & ~far & (owner == of_object)
+        pose = known[of_object].world_from_object if of_object else np.eye(4)
+        own = transform(inverse_pose(pose), point[at, :3])
+        xy[at] = pixels_in_rows(sample.camera, rows, of_object - 1, pose, own)[0]
+    turned = RowPoses(rows.rotation, np.zeros_like(rows.translation), {})
+    xy[far & is_there] = pixels_in_rows(sample.camera, turned, -1, np.eye(4), point[far & is_there, :3])[0]
+    return xy
 
 
 def in_camera(sample: Sample) -> NDArray[np.float64]:
@@ -116,7 +141,6 @@ LABEL = ChannelLabel(
     meaning="points followed through the sequence, a row each: where each was picked, where it is now, whether it is seen",
     axes="world, image",
     needs=(FollowedPoints(),),
-    one_pose=True,
     dtype=TRACK,
     components=0,
     unit="m, px",

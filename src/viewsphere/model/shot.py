@@ -54,7 +54,7 @@ class Shot(Frozen):
     label_alpha: float = 0.01
     category_deg: float = Field(default=45.0, gt=0)  # angular resolution of the pose categories
     shutter: float = Field(default=0.0, ge=0, le=1)
-    exposures: tuple[Exposure | None, ...] = ()  # None: nothing moves, or the instant is not recorded
+    exposures: tuple[Exposure | None, ...] = ()  # None: nothing moves, or it is not needed
     optional: dict[str, JsonValue] = Field(default_factory=dict)  # facts by name: readers ignore names of later versions
 
     @model_validator(mode="after")

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from viewsphere.assets.appearance.repaint import textured
 from viewsphere.assets.mesh import Mesh
-from viewsphere.geometry.rotation import compose, inverse, product, rigid, transform
+from viewsphere.geometry.rotation import compose, inverse_pose, product
 from viewsphere.model.annotations.tracks import TRACK, Tracks
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.scene import Finish, Ground, Matrix4
@@ -227,12 +227,6 @@ class Moment:
         return self.cameras[self.sensor]
 
 
-def _back(pose: Float) -> Float:
-    """The inverse of a rigid pose (4, 4)."""
-    turned = inverse(pose[:3, :3])
-    return rigid(turned, -transform(turned, pose[:3, 3]))
-
-
 @dataclass(frozen=True, eq=False)
 class NeighbourViews:
     """The views beside that of one sample: of a sensor at an instant of a shot."""
@@ -298,7 +292,7 @@ class NeighbourViews:
             poses = [thing.motion.pose_at(instant) for instant in range(len(shot.instants))]
             now = poses[self.instant]
             if now is not None and any(pose not in (None, now) for pose in poses):
-                back = _back(np.array(now))
+                back = inverse_pose(np.array(now))
                 moved[i] = np.stack([compose(pose, back) for pose in self._poses(poses, moments)])
         return Turning(rotation, -product(rotation, placed[:, :3, 3:])[..., 0], moved)
 

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewsphere.geometry.rotation import inverse, transform
-from viewsphere.model.sensors.camera import Camera
+from viewsphere.model.sensors.camera import Camera, Intrinsics
 from viewsphere.model.thing import Thing
 from viewsphere.truth.raster.geometry import Geometry, seen_from
 from viewsphere.truth.raster.rolling import owners_of
@@ -105,7 +105,22 @@ class View:
     @cached_property
     def visibility(self) -> Visibility:
         """The triangles and the depth visible to the camera."""
-        return rasterize(self.geometry, self.camera, corners=self.corners, keeps_exact=self.is_compared)
+        corners = self.corners if self.camera.rows is None else None
+        return rasterize(self.geometry, self.camera, corners=corners, keeps_exact=self.is_compared)
+
+    def at_row(self, row: int, lens: Intrinsics | None = None) -> View:
+        """The view of a camera with a global shutter at the time of a row of this one's rolling shutter, through its own lens
+        or another one.
+        """
+        rows, lens = self.camera.rows, lens or self.camera.intrinsics
+        assert rows is not None
+        geometry = self.geometry
+        if rows.moving:
+            poses, bounds = geometry.poses.copy(), geometry.bounds.copy()
+            for i in (i for i in rows.moving if i < len(poses)):
+                poses[i], bounds[i] = rows.moving[i][row], ((-np.inf,) * 3, (np.inf,) * 3)
+            geometry = replace(geometry, poses=poses, bounds=bounds)
+        return replace(self, geometry=geometry, camera=Camera(lens, rows.rotation[row], rows.translation[row]))
 
     def rays_to(self, inverse_depth: Float) -> Float:
         """Rays (H, W, 3), camera axes, from the camera's centre to the points that the pixels show at 1/s `inverse_depth` (H,

@@ -176,7 +176,6 @@ class LabelContext:
         """
         if not self.needs:
             self._check(OwnView())
-        self._check_pose()
         return self.neighbours.view(0, None) if self.neighbours else None
 
     def _check_pose(self) -> None:

@@ -1,4 +1,4 @@
-"""A check shared by labels of positions: it finds points that are not at their pixels or not at their depth."""
+"""Checks shared by labels of positions: they find points that are not at their pixels or not at their depth."""
 
 from __future__ import annotations
 
@@ -9,6 +9,8 @@ from viewsphere.geometry.camera import pixel_rays
 from viewsphere.geometry.rotation import product, transform
 from viewsphere.labels.shared.spec import Array, channel_of
 from viewsphere.model.sample import ObjectAnnotation, Sample
+from viewsphere.model.sensors.camera import Camera
+from viewsphere.model.sensors.rolling import RowPoses
 
 Float = NDArray[np.float64]
 
@@ -62,3 +64,30 @@ def largest(rows: Float) -> Float:
     """The greatest absolute value in each row of three, (N,)."""
     x, y, z = np.abs(rows).T
     return np.maximum(np.maximum(x, y), z)
+
+
+def pixels_of_rows(camera: Camera, rows: RowPoses, o: ObjectAnnotation, points: Float) -> Float:
+    """Pixels (N, 2) of points (N, 3) in an object's axes under a rolling shutter, written out here for proofs: of the rows that
+    meet a point, the nearest to the middle; NaN where none does.
+    """
+    height, row = len(rows.rotation), np.arange(len(rows.rotation)) + 0.5
+    poses = rows.moving.get(o.id - 1, np.tile(o.world_from_object, (height, 1, 1)))
+    world = np.einsum("hij,nj->hni", poses[:, :3, :3], points) + poses[:, None, :3, 3]
+    seen = np.einsum("hij,hnj->hni", rows.rotation, world) + rows.translation[:, None]
+    homogeneous = np.einsum("ij,hnj->hni", camera.K, seen)
+    expected = np.full((len(points), 2), np.nan)
+    for k in range(len(points)):
+        u, v, w = homogeneous[:, k].T
+        with np.errstate(divide="ignore", invalid="ignore"):
+            x, y = u / w, v / w
+        off, places = y - row, list[tuple[float, float]]()
+        for r in np.flatnonzero((w[:-1] > 0) & (w[1:] > 0) & (off[:-1] * off[1:] <= 0)).tolist():
+            share = off[r] / (off[r] - off[r + 1])
+            places.append((x[r] + share * (x[r + 1] - x[r]), row[r] + share))
+        if w[0] > 0 and off[0] <= 0:
+            places.append((x[0], y[0]))
+        if w[-1] > 0 and off[-1] >= 0:
+            places.append((x[-1], y[-1]))
+        if places:
+            expected[k] = min(places, key=lambda place: abs(place[1] - height / 2))
+    return expected

@@ -145,7 +145,8 @@ def _shot(context: SamplingContext, subject: str, poses: Sequence[int], box_of: 
     def rig_at(instant: int) -> Matrix4:
         return _instant(context, state, subject, start + instant, box_of).world_from_rig
 
-    exposed = _exposures(state, [i if i in taken else None for i in numbers], context, rig_at)
+    rolls = context.recipe.camera.rolling is not None  # labels then compare the rows of all instants
+    exposed = _exposures(state, [i if i in taken or rolls else None for i in numbers], context, rig_at)
     more = {"sequence": context.sequence(subject, start), "tracks": _tracks(context, subject, start)}
     return finished.model_copy(update=more | {"shutter": time_of(context).shutter, "exposures": exposed})
 
@@ -215,7 +216,7 @@ def _exposures(
     state: SequenceState, instants: Sequence[int | None], context: SamplingContext, rig_at: RigAt
 ) -> tuple[Exposure | None, ...]:
     """Return the movements around each of these instants; empty for a shutter without duration.
-    An instant has None where it is not recorded (None), and where nothing moves.
+    An instant has None where no exposure is needed (None), and where nothing moves.
     """
     time, rolling = time_of(context), context.recipe.camera.rolling
     length = time.shutter + (0.0 if rolling is None else rolling.readout * time.fps)

@@ -14,6 +14,7 @@ from viewsphere.geometry.rotation import transform
 from viewsphere.truth.raster.visibility import direction_matrix
 from viewsphere.truth.surface_points.attached import rays_through, stick, weights_of
 from viewsphere.truth.surface_points.raster import Placed, first_met, in_lens, placed_at, states
+from viewsphere.truth.surface_points.rolling import placed_in_rows
 from viewsphere.truth.view import Body, View
 
 Float = NDArray[np.float64]
@@ -98,6 +99,20 @@ def points_seen(view: View, xy: ArrayLike) -> SurfacePoints:
     Points are NOWHERE outside the picture, if the lens has no ray, or if a flat picture is visible.
     """
     xy = np.ascontiguousarray(xy, np.float64).reshape(-1, 2)
+    return _seen_at_once(view, xy) if view.camera.rows is None else _seen_in_rows(view, xy)
+
+
+def _seen_in_rows(view: View, xy: Float) -> SurfacePoints:
+    """`points_seen` under a rolling shutter: each row shows the world at its own time."""
+    row = np.clip(np.floor(np.nan_to_num(xy[:, 1])), 0, view.camera.height - 1).astype(np.intp)
+    order = np.argsort(row, kind="stable")
+    parts = np.split(order, np.flatnonzero(np.diff(row[order])) + 1)
+    seen = SurfacePoints.joined([_seen_at_once(view.at_row(int(row[at[0]]) if len(at) else 0), xy[at]) for at in parts])
+    return seen.chosen(np.argsort(order, kind="stable"))
+
+
+def _seen_at_once(view: View, xy: Float) -> SurfacePoints:
+    """`points_seen` under a global shutter."""
     inside = ((xy >= 0.0) & (xy < (view.camera.width, view.camera.height))).all(axis=1)
     rays = rays_through(view, xy)
     has_ray = np.logical_and(inside, ~np.isnan(rays).any(axis=1))
@@ -164,7 +179,7 @@ class _Tracked:
 
     @cached_property
     def xyz(self) -> Float:
-        """The places in the camera's axes, (N, 3); (NaN, NaN, inf) for the sky."""
+        """The places in the camera's axes, (N, 3), at the instant; (NaN, NaN, inf) for the sky."""
         out = transform(self.view.camera.R, self.world) + self.view.camera.t
         out[self._is_sky & in_lens(self.xy), 2] = np.inf
         return out
@@ -180,12 +195,21 @@ class _Tracked:
         own = self._own
         ground = self.view.geometry.triangle_start[-1]
         on = np.where(self.points.body == GROUND, np.int32(ground), own) if self._has_ground else own
+        if self.view.camera.rows is not None:
+            places = np.where(self._is_sky[:, None], self.points.place, self.world)
+            return placed_in_rows(self.view, places, self.moving, lambda: on, self._is_sky)
         placed = placed_at(self.view, transform(self.view.camera.R, self.world) + self.view.camera.t, lambda: on)
         sky = np.flatnonzero(self._is_sky)
         if len(sky):
             directions = transform(self.view.camera.R, self.points.place[sky])
             self._write_sky(placed, sky, directions)
         return placed
+
+    @property
+    def moving(self) -> Whole:
+        """The position of each point's thing in the view's `things`, (N,), -1 if it has none."""
+        owners = np.append(self.view.owners, np.int32(-1))
+        return np.where(self._own >= 0, owners[self._own], np.int32(-1))
 
     def _write_sky(self, placed: Placed, sky: NDArray[np.intp], directions: Float) -> None:
         xy, _ = project(self.view.camera.intrinsics, directions)

@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -15,6 +16,7 @@ from numpy.typing import NDArray
 
 from viewsphere.geometry.camera import project
 from viewsphere.geometry.rotation import product
+from viewsphere.model.sensors.camera import Intrinsics
 from viewsphere.truth.kernel_constants import FOUR, NEARER
 from viewsphere.truth.raster.visibility import pixels_of, projected
 from viewsphere.truth.view import View
@@ -34,6 +36,7 @@ GAP = 1e-6  # share of the depth: above the rounding of one depth computed twice
 FACES = ((0, 1, 2, 1.0), (0, 1, 2, -1.0), (1, 2, 0, 1.0), (1, 2, 0, -1.0), (2, 0, 1, 1.0), (2, 0, 1, -1.0))
 """Sides of the cube around a fisheye or a scan: the axes for right and down, the axis that the side faces, and its sign."""
 
+NARROW = 1e-6  # least width of a picture of one row, at z = 1: above the rounding of its pixels. Not measured alone
 LARGEST_SIDE = 1024  # pixels along a side of the cube
 
 
@@ -43,7 +46,8 @@ class Placed:
 
     xy (..., 2) float64 pixels, NaN if the lens has none. near (...) float64: 1/s, with s as in `raster.visibility.Visibility`;
     0 for points at infinity and for points without a pixel, NaN for points that do not exist. rays (..., 3) in camera axes, so
-    that the point is ray / near: None for a pinhole, which needs none. `own` gives (...) int32: the view's triangle under the
+    that the point is ray / near: None for a pinhole, which needs none, unless it has a rolling shutter: then they are in the
+    axes of the camera at the time of the point's row. `own` gives (...) int32: the view's triangle under the
     point, -1 for none; the ground's triangles count as one.
     """
 
@@ -94,14 +98,40 @@ def states(placed: Sequence[Placed]) -> list[NDArray[np.uint8]]:
     xy = _joined([points.xy.reshape(-1, 2) for points in placed])
     near = _joined([points.near.reshape(-1) for points in placed])
     own_triangles = _joined([points.own().reshape(-1) for points in placed])
-    rays = None if view.is_pinhole else _joined([p.rays.reshape(-1, 3) for p in placed if p.rays is not None])
+    has_rays = not view.is_pinhole or view.camera.rows is not None
+    rays = _joined([p.rays.reshape(-1, 3) for p in placed if p.rays is not None]) if has_rays else None
     state, cell = _classified(xy, near, (view.camera.width, view.camera.height))
-    for index, met in _meetings(view, xy, near, own_triangles, cell, rays):
-        kernels.hide(met, index, np.uint8(OCCLUDED), state)
-    if view.shown is not view.geometry:
-        state[(state == VISIBLE) & view.is_turned_away(own_triangles)] = OCCLUDED
+    if view.camera.rows is not None and rays is not None:
+        _hide_in_rows(view, near, rays, own_triangles, cell, state)
+    else:
+        for index, met in _meetings(view, xy, near, own_triangles, cell, rays):
+            kernels.hide(met, index, np.uint8(OCCLUDED), state)
+        if view.shown is not view.geometry:
+            state[(state == VISIBLE) & view.is_turned_away(own_triangles)] = OCCLUDED
     stops = np.cumsum([points.near.size for points in placed])[:-1]
     return [part.reshape(points.near.shape) for part, points in zip(np.split(state, stops), placed, strict=True)]
+
+
+def _hide_in_rows(view: View, near: Float, rays: Float, own: Whole, cell: Whole, state: NDArray[np.uint8]) -> None:
+    """Write the states of the points whose pixel `cell` is not -1: those of pictures of single rows, in which the world and the
+    camera are at the row's time.
+    """
+    inside = np.flatnonzero(cell >= 0)
+    inside = inside[np.argsort(cell[inside], kind="stable")]
+    row = cell[inside] // view.camera.width
+    for at in np.split(inside, np.flatnonzero(np.diff(row)) + 1) if len(inside) else ():
+        lens, xy = _strip(view.camera.width, rays[at])
+        strip = view.at_row(int(cell[at[0]]) // view.camera.width, lens)
+        state[at] = states([Placed(strip, xy, near[at], None, partial(own.take, at))])[0]
+
+
+def _strip(width: int, rays: Float) -> tuple[Intrinsics, Float]:
+    """A pinhole with pictures of one row that shows all rays (N, 3), whose z is 1, and their pixels (N, 2)."""
+    low, high, size = rays[:, :2].min(axis=0), rays[:, :2].max(axis=0), np.array([width, 1.0])
+    (fx, fy), (u, v) = size / np.maximum((high - low) * (1 + 1e-9), NARROW), low
+    lens = Intrinsics(width=width, height=1, fx=fx, fy=fy, cx=-fx * u, cy=-fy * v)
+    xy = rays[:, :2] * (fx, fy) + (lens.cx, lens.cy)
+    return lens, np.clip(xy, 0.0, np.nextafter(size, 0.0))
 
 
 def _classified(xy: Float, near: Float, size: tuple[int, int]) -> tuple[NDArray[np.uint8], Whole]:
