@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 import shutil
+from itertools import pairwise
 
 import numpy as np
 import pytest
 
 from sealing import seal_again
-from viewsphere import Dataset, Recipe, generate, render
+from viewsphere import Dataset, Recipe, generate, matches, render
 from viewsphere.check import check
 from viewsphere.labels import channels
 from viewsphere.labels.tracks import positions
 from viewsphere.store import encode
 from viewsphere.truth.surface_points.raster import BEHIND, INVALID, OCCLUDED, OUTSIDE, VISIBLE
+
+MOTION = ["flow", "flow_state", "flow_backward", "flow_backward_state", "motion_boundaries", "scene_flow"]
+CHANNELS = ["depth", "instances", "tracks", *MOTION]
 
 
 def rolling_recipe(**changes) -> Recipe:
@@ -33,7 +37,7 @@ def rolling_recipe(**changes) -> Recipe:
         "time": {"frames": 4, "fps": 10},
         "camera": {"size": [96, 72], "fov_deg": 45, "rolling": {"readout": 0.0771}},
         "scene": {"ground": True},
-        "channels": ["depth", "instances", "tracks"],
+        "channels": CHANNELS,
         "tracks": {"grid": 9, "at": [1]},
         "annotations": ["keypoints", "obb"],
         "splits": {"by": "sequence"},
@@ -52,7 +56,14 @@ def whole(tmp_path_factory):
 def test_check_proves_them(whole):
     report = check(Dataset(whole))
     assert not report.findings and not report.not_run
-    assert report.checked["keypoints"] == report.checked["obb"] == report.checked["tracks"] == len(Dataset(whole)) == 8
+    assert (
+        report.checked["keypoints"]
+        == report.checked["obb"]
+        == report.checked["flow"]
+        == report.checked["tracks"]
+        == len(Dataset(whole))
+        == 8
+    )
 
 
 def test_keypoints_are_seen_where_they_stand_at_the_time_of_their_row(whole):
@@ -89,6 +100,42 @@ def test_tracks_start_where_they_were_picked_and_end_where_rows_show_them(whole)
     assert {VISIBLE, OCCLUDED, OUTSIDE} <= states
 
 
+def test_flow_leads_to_the_rows_of_the_next_picture(whole):
+    """Where a point is visible in the next picture, the pixel there shows its object; and its flow leads back to its pixel,
+    but for half a pixel in which the surface is another.
+    """
+    samples, ends = list(Dataset(whole)), np.array((95, 71))
+    agreed, back = list[bool](), list[float]()
+    for now, then in pairwise(samples):
+        if now.sequence != then.sequence:
+            continue
+        found, centers = matches(now, then), np.stack(np.meshgrid(np.arange(96), np.arange(72)), axis=-1) + 0.5
+        np.testing.assert_allclose(found.xy - centers, now.channels["flow"], rtol=1e-5, atol=1e-4)
+        y, x = np.nonzero((now.channels["flow_state"] == VISIBLE) & (now.channels["instances"] > 0))
+        there = np.column_stack((x, y)) + 0.5 + now.channels["flow"][y, x]
+        column, row = np.minimum(there.astype(int), ends).T
+        padded = np.pad(then.channels["instances"], 1)  # a bicycle's tubes are thinner than a pixel
+        around = [padded[row + v, column + u] for v in range(3) for u in range(3)]
+        agreed += (np.array(around) == now.channels["instances"][y, x]).any(axis=0).tolist()
+        flow = then.channels["flow_backward"][row, column]
+        back += np.linalg.norm(there + flow - np.column_stack((x, y)) - 0.5, axis=1).tolist()
+    assert np.mean(agreed) > 0.9 and np.nanmedian(back) < 0.5 and len(back) > 300
+
+
+def test_rectified_cameras_roll_together(tmp_path):
+    """Rows with one number are exposed together, so disparity is baseline x focal length / depth in every row."""
+    names = ["depth", "disparity", "disparity_state", "disparity_change"]
+    recipe = rolling_recipe(rig={"kind": "stereo", "baseline": 0.03}, channels=names, tracks=None, annotations=[])
+    generate(recipe, tmp_path / "out", workers=0)
+    dataset = Dataset(tmp_path / "out")
+    report = check(dataset)
+    assert not report.findings and report.checked["disparity"] == len(dataset) == 16
+    for sample in dataset:
+        depth, disparity = sample.channels["depth"], sample.channels["disparity"]
+        np.testing.assert_allclose(disparity * depth, sample.camera.K[0, 0] * 0.03, rtol=1e-5)
+        assert set(np.unique(sample.channels["disparity_state"])) <= {VISIBLE, OCCLUDED, OUTSIDE}
+
+
 def test_labels_do_not_depend_on_the_cut_into_shots(whole):
     """Shots of one frame hold the rows of other instants, too, at which points are picked and with which labels compare."""
     for kept, sample in zip(Dataset(whole), render(rolling_recipe(shot_frames=1)), strict=True):
@@ -101,6 +148,16 @@ def test_labels_do_not_depend_on_the_cut_into_shots(whole):
 @pytest.fixture
 def copied(whole, tmp_path):
     return shutil.copytree(whole, tmp_path / "out")
+
+
+@pytest.mark.parametrize("name", MOTION)
+def test_a_changed_pixel_of_motion_is_found(copied, name):
+    sample = Dataset(copied)[1]
+    array = np.array(sample.channels[name])
+    array[30, 40] = array[30, 40] + np.ones_like(array[30, 40]) * (0.01 if array.dtype.kind == "f" else 1)
+    (copied / sample.files[name]).write_bytes(encode(channels()[name], array))
+    seal_again(copied)
+    assert any(sample.index == finding.frame for finding in check(Dataset(copied)).findings)
 
 
 @pytest.mark.parametrize("field", ["state", "point"])

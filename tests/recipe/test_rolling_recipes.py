@@ -78,7 +78,7 @@ FISHEYE = {"model": "fisheye", "coefficients": [0, 0, 0, 0]}
         ({"time": None}, "camera.rolling: expected time beside it"),
         ({"time": {"frames": 3, "fps": 13}}, "camera.rolling.readout: expected at most 0.0769231 s"),
         ({"time": {"frames": 3, "fps": 10, "shutter": 0.2}}, "time.shutter: expected 0 beside camera.rolling; found 0.2"),
-        ({"channels": ["rgb", "flow"]}, "channels: flow: expected no camera.rolling beside it"),
+        ({"channels": ["rgb", "depth_sensor"]}, "channels: depth_sensor: expected no camera.rolling beside it"),
         ({"channels": ["rgb", "voxels"]}, "channels: voxels: expected no camera.rolling beside it"),
         ({"engine": "cycles"}, "engine: expected one that paints rolling shutters"),
         ({"scene": {"ground": True, "rain": 5}}, "scene.rain: expected off beside camera.rolling"),
@@ -94,9 +94,9 @@ def test_what_it_rules_out_is_one_line_before_rendering(changes, told):
     assert told in str(error.value) and "\n" not in str(error.value)
 
 
-def test_labels_that_compare_views_require_one_pose():
-    """A label that reads another view of the sequence, or points of whole objects, cannot be computed for rows with poses."""
-    compared = {"Next", "Previous", "Partner", "ObjectPoints"}
+def test_labels_of_whole_objects_require_one_pose():
+    """A label that reads points of whole objects cannot be computed for rows with poses."""
+    compared = {"ObjectPoints"}
     for name, label in labels().items():
         if compared & {type(need).__name__ for need in label.needs}:
             assert label.one_pose, name

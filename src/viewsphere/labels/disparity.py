@@ -97,7 +97,6 @@ LABEL = ChannelLabel(
     options=_Options,
     axes="image",
     needs=(Partner(),),
-    one_pose=True,
     refuses=no_disparity,
     dtype=np.float32,
     unit="px",

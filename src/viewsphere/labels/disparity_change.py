@@ -69,7 +69,6 @@ LABEL = ChannelLabel(
     meaning="the seen point's disparity one instant later, less its disparity",
     axes="image",
     needs=(Next(), Partner()),
-    one_pose=True,
     refuses=_refuses,
     dtype=np.float32,
     unit="px",

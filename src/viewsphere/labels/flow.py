@@ -69,7 +69,6 @@ def _label(name: str, to: Next | Previous, when: str) -> ChannelLabel:
         meaning=f"where the seen point is one instant {when}, right and down of where it is",
         axes="image",
         needs=(to,),
-        one_pose=True,
         dtype=np.float32,
         components=2,
         unit="px",

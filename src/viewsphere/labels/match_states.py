@@ -54,7 +54,6 @@ def _label(name: str, where: str, other: Next | Previous | Partner) -> ChannelLa
         name=name,
         meaning=f"the seen point {where}: {MEANING}",
         needs=(other,),
-        one_pose=True,
         refuses=no_disparity if isinstance(other, Partner) else None,
         dtype=np.uint8,
         ids={},

@@ -105,7 +105,6 @@ LABEL = ChannelLabel(
     name="motion_boundaries",
     meaning="1 where a pixel beside shows something else that moves otherwise",
     needs=(Next(),),
-    one_pose=True,
     dtype=np.uint8,
     ids={},
     encoding="png",

@@ -53,7 +53,6 @@ def _label(name: str, to: Next | Previous, when: str, state: str) -> ChannelLabe
         meaning=f"motion of the seen point to one instant {when}, each place in its own instant's camera axes",
         axes="camera",
         needs=(to,),
-        one_pose=True,
         dtype=np.float32,
         components=3,
         unit="m",

@@ -10,7 +10,7 @@ from typing import Any, Generic, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from viewsphere.errors import PluginError, UserError
+from viewsphere.errors import PluginError
 from viewsphere.geometry.box import Bounds, is_behind, projected_bounds
 from viewsphere.geometry.lenses import NEAR
 from viewsphere.geometry.rotation import product
@@ -21,6 +21,7 @@ from viewsphere.model.fields.frozen import Frozen
 from viewsphere.model.sensors.camera import Camera
 from viewsphere.model.sensors.rolling import RowPoses
 from viewsphere.truth.correspondences.correspondence import Match
+from viewsphere.truth.correspondences.rolling import match_between
 from viewsphere.truth.raster.geometry import Geometry
 from viewsphere.truth.raster.rolling import RowRuns, centers_of, pixels_in_rows, reach_in_rows, row_runs
 from viewsphere.truth.raster.visibility import (
@@ -178,18 +179,12 @@ class LabelContext:
             self._check(OwnView())
         return self.neighbours.view(0, None) if self.neighbours else None
 
-    def _check_pose(self) -> None:
-        """Raise UserError if the rows of the picture have poses of their own, which comparisons of views do not know."""
-        if self.camera.rows is not None:
-            raise UserError(f"label {self.label}: expected a global shutter; found a rolling one: leave the label out")
-
     def match(self, need: Need[View | None]) -> Match | None:
         """Return the places of the picture's points in a neighbouring view. The result is kept, so that labels share it."""
         self._check(need)
-        self._check_pose()
         if need not in self._matches:
             own, other = self.own_view, self.get(need)
-            self._matches[need] = Match(own, self.visibility, other) if own and other else None
+            self._matches[need] = match_between(own, self.visibility, other) if own and other else None
         return self._matches[need]
 
     def options_of(self, name: str, kind: type[OptionsT]) -> OptionsT:

@@ -77,9 +77,7 @@ def _limits(recipe: Recipe, rig: Rig) -> Iterator[tuple[str, str]]:
             label = label_named(name)
             reason = label.refuses(sensor.intrinsics) if label is not None and label.refuses is not None else None
             if reason is None and label is not None and label.one_pose and sensor.intrinsics.rolling is not None:
-                reason = (
-                    "expected no camera.rolling beside it, as it compares whole pictures of one pose; found one: leave it out"
-                )
+                reason = "expected no camera.rolling beside it, as it needs one pose of all rows; found one: leave it out"
             if reason is not None:
                 yield "channels" if is_channel(name) else "annotations", f"{name}: {reason}"
         if sensor.intrinsics.rolling is not None:

@@ -17,7 +17,7 @@ from viewsphere.model.shot import Shot
 from viewsphere.model.thing import Thing
 from viewsphere.run.shots.stages import Stages
 from viewsphere.store import Store, located
-from viewsphere.truth.correspondences.correspondence import Match
+from viewsphere.truth.correspondences.rolling import match_between
 from viewsphere.truth.shot_views import views_of
 from viewsphere.truth.view import View
 
@@ -61,7 +61,7 @@ def matches(a: Sample, b: Sample) -> Matches:
             f"matches: expected two samples of one sequence, or of one subject's stills; found {' and '.join(names)}"
         )
     one, other = (_view(sample, shot) for sample, shot in zip((a, b), shots, strict=True))
-    found = Match(one, one.visibility, other)
+    found = match_between(one, one.visibility, other)
     z = np.where(np.isnan(found.xy[..., 0]), np.nan, found.xyz[..., 2])
     return Matches(found.xy, z, found.state)
 

@@ -123,7 +123,7 @@ class Match:
         xy, near, rays = self._on_pinhole() if self.other.is_pinhole else self._as_rays()
         if self._deformed is not None:
             self._write_deformed(xy, near, rays)
-        return Placed(self.other, xy, near, rays, partial(_own, self.visibility.triangle, self.view, self.other))
+        return Placed(self.other, xy, near, rays, partial(own_triangles, self.visibility, self.view, self.other))
 
     @cached_property
     def _inverse(self) -> Float:
@@ -206,11 +206,11 @@ class Match:
             rays.reshape(-1, 3)[pixel] = there_rays
 
 
-def _own(seen: NDArray[np.int32], view: View, other: View) -> NDArray[np.int32]:
+def own_triangles(visibility: Visibility, view: View, other: View) -> NDArray[np.int32]:
     """The other view's numbers of the triangles visible in a view, -1 if there is none."""
     from viewsphere.truth.correspondences import kernels_correspond as kernels
 
-    shift = shifts(view, other)
+    seen, shift = visibility.triangle, shifts(view, other)
     if not shift.any():
         return seen
     triangles = np.empty(seen.shape, np.int32)
