@@ -53,6 +53,18 @@ VARIANTS: Mapping[str, dict[str, Any]] = {
     },
     "background": {"scene": {"background": {"color": "#808080"}, "ground": "off"}},
     "transparent": {"scene": {"background": {"transparent": True}}},
+    "orthographic": {"camera": {"projection": "orthographic", "width_m": 4, "size": [64, 48]}},
+    "rolling shutter": {
+        "models": [{"source": "zoo:car", "motion": {"kind": "constant", "velocity": [1, 0, 0]}}],
+        "viewpoints": {"kind": "orbit", "azimuth": [0, 40], "elevation": 20, "distance": 4},
+        "time": {"frames": 2, "fps": 10},
+        "camera": {"size": [64, 48], "rolling": {"readout": 0.05}},
+        "scene": {"ground": True},
+        "channels": ["rgb", "depth", "instances", "normals", "position", "flow", "flow_state", "tracks"],
+        "tracks": {"count": 16, "at": [0]},
+        "annotations": ["keypoints", "amodal"],
+        "splits": {"by": "sequence"},
+    },
 }
 
 

@@ -12,9 +12,11 @@ import numpy as np
 import pytest
 from numba import typeof, types
 
+from viewsphere import Recipe, plan
 from viewsphere.kernels import overloads, precompile
 from viewsphere.kernels.overloads import Overload
 from viewsphere.kernels.precompile import compile_all
+from viewsphere.run.shots.precompile import features
 
 Pair = namedtuple("Pair", "first second")
 READ_ONLY = np.zeros((2, 3), np.float32)
@@ -73,6 +75,35 @@ def test_what_a_shot_needs_is_decided_by_its_features():
     everything = frozenset(feature for each in overloads.table() for feature in each.needs or ())
     more = overloads.needed(everything)
     assert set(some) < set(more) and all(each.needs is not None for each in more)
+
+
+PLAIN = {
+    "models": [{"source": "zoo:post_box"}],
+    "viewpoints": {"kind": "orbit", "azimuth": [0, 40], "elevation": 20, "distance": 4},
+    "time": {"frames": 2, "fps": 10},
+    "splits": {"by": "sequence"},
+}
+CAMERAS = {
+    "pinhole": ({}, {"kernels_draw.draw"}),
+    "orthographic": (
+        {"projection": "orthographic", "width_m": 4},
+        {"kernels_parallel.draw", "kernels_samples.draw_parallel"},
+    ),
+    "rolling": (
+        {"rolling": {"readout": 0.05}},
+        {"kernels_rolling.draw", "kernels_rolling.list_active", "kernels_rolling.find_pixels", "kernels_samples.draw_rolling"},
+    ),
+}
+
+
+@pytest.mark.parametrize("name", CAMERAS)
+def test_the_kernels_of_a_camera_are_compiled_for_its_shots_alone(name):
+    camera, kernels = CAMERAS[name]
+    shot = next(iter(plan(Recipe.model_validate({**PLAIN, "camera": camera})).shots(lambda *_: np.zeros((8, 3)))))
+    called = {f"{each.module.rpartition('.')[2]}.{each.kernel}" for each in overloads.needed(features(shot))}
+    assert kernels <= called
+    others = set().union(*(theirs for other, (_, theirs) in CAMERAS.items() if other not in (name, "pinhole")))
+    assert called.isdisjoint(others)
 
 
 def test_a_written_table_is_read_again(tmp_path, monkeypatch):

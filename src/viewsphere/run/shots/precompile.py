@@ -198,11 +198,12 @@ def _small(shot: Shot) -> Shot:
 
 
 def _sequence(shot: Shot, first: Instant, things: tuple[Thing, ...]) -> dict[str, Any]:
-    """Two instants between which one of the things moves, with blur if the shutter is open."""
+    """Two instants between which one of the things moves, with blur if the shutter is open, and in rows if it rolls."""
     there_and_back = Motion(poses=(IDENTITY, BESIDE))
     moved = things[0].model_copy(update={"motion": there_and_back})
     sweeps = (Sweep(moments=(-0.5, 0.5), motion=there_and_back), *[None] * (len(things) - 1))
-    exposures = (Exposure(things=sweeps),) * 2 if shot.shutter else ()
+    readout = next((lens.rolling.readout for lens in (one.intrinsics for one in shot.rig.sensors) if lens.rolling), None)
+    exposures = (Exposure(things=sweeps, interval=readout),) * 2 if shot.shutter or readout else ()
     tracks = shot.tracks and Tracks(at=(0,), count=4, on="objects")
     instants = (first, first.model_copy(update={"index": 1, "seconds": 1.0}))
     return {"sequence": "tiny", "things": (moved, *things[1:]), "instants": instants, "tracks": tracks, "exposures": exposures}

@@ -347,7 +347,7 @@ def _rays_of_rows(
     if samples is None:
         row, at = _centers(width, camera.height)
     else:
-        row, at = np.repeat(samples.pixels // width, 4), samples.position.astype(np.float64)
+        row, at = np.repeat(samples.pixels // width, 4).astype(np.int64), samples.position.astype(np.float64)
     of_triangle = np.append(slot[owners_of(geometry)], 0)  # the last one is that of the sky
     which = np.zeros(len(at), np.int64) if triangle is None else of_triangle[triangle]
     if slots is None:
