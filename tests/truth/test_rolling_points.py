@@ -9,9 +9,11 @@ from two_views import centers, expected_states, pose, view
 from rolling_scenes import at_row, rolling_camera, shown_rows
 from truth_scenes import cube, lens, orbit_camera, random_soup, sphere
 from viewsphere.model.sensors.rolling import RowPoses
+from viewsphere.truth.raster.rolling import pixels_in_rows
 from viewsphere.truth.surface_points.draws import points_on
 from viewsphere.truth.surface_points.points import FREE, GROUND, SKY, points_in_world, points_seen
 from viewsphere.truth.surface_points.raster import BEHIND, OCCLUDED, OUTSIDE, VISIBLE
+from viewsphere.truth.surface_points.rolling import when_shown
 from viewsphere.truth.view import View
 
 
@@ -103,3 +105,18 @@ def test_a_point_moves_through_the_picture_in_closed_form():
     found = points_in_world(world).in_view(whole)
     assert (found.points.body == FREE).all() and ((y > 0.5) & (y < height - 0.5)).all()
     np.testing.assert_allclose(found.xy, np.column_stack((x, y)), atol=1e-9)
+
+
+def test_a_place_at_the_time_of_its_row_is_shown_by_that_row_as_if_it_stood_still():
+    """So tracks on moving scenery, whose motion no sample holds, have positions in the picture."""
+    rng = np.random.default_rng(4)
+    whole = rolling_view(rng, 0.1, 0.4)
+    tracked = points_on(whole, 200, rng, things=[0, 1, 2]).in_view(whole)
+    places = when_shown(whole, tracked.world, tracked.moving, tracked.xy[:, 1])
+    found, _ = pixels_in_rows(whole.camera, whole.camera.rows, -1, np.eye(4), places)
+    inside = (tracked.xy[:, 1] > 0.5) & (tracked.xy[:, 1] < 47.5)
+    still = tracked.points.thing == 2
+    np.testing.assert_array_equal(places[still], tracked.world[still])
+    np.testing.assert_allclose(found[inside], tracked.xy[inside], atol=2e-3)
+    at_once, _ = pixels_in_rows(whole.camera, whole.camera.rows, -1, np.eye(4), tracked.world)
+    assert np.abs(at_once - tracked.xy)[inside & ~still].max() > 1 and inside.sum() > 50
