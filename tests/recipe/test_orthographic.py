@@ -236,4 +236,7 @@ def test_a_camera_s_picture_and_words_show_a_box_instead_of_a_pyramid():
     rig = recipe_rig(parallel_recipe())
     assert any("96 x 72, 0.32 x 0.24 m, orthographic" in line for line in rig_lines(rig))
     low, high = rig_mesh(rig).bounds
-    assert np.isfinite([low, high]).all() and (np.subtract(high, low) > 0).all()
+    np.testing.assert_allclose(np.subtract(high, low)[:2], [0.32, 0.32], rtol=0.2)
+    filled = parallel_recipe(camera={**CAMERA, "width_m": None}, viewpoints={"distance": {"fill": 0.6}})
+    text = list(rig_lines(recipe_rig(filled), filled))
+    assert any("96 x 72, width from distance: {fill: ...}, orthographic" in line for line in text)

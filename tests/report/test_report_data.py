@@ -8,6 +8,8 @@ import numpy as np
 import pytest
 import yaml
 
+import viewsphere as vs
+from small import small_recipe
 from viewsphere.errors import StoreError, UserError
 from viewsphere.report import Proof, chosen_frames, report_data, write_report
 from viewsphere.report.frames import frame_data
@@ -191,6 +193,16 @@ def test_what_is_not_known_is_null(small_dataset):
     assert "bottom" not in other["faces"]
     assert found["size"] == [96, 72]
     assert frame_data(replace(sample, objects=()))["objects"] == []
+
+
+def test_bent_lenses_have_the_lines_of_their_frustum(small_dataset):
+    sample = small_dataset[0]
+    assert frame_data(sample)["camera"]["lines"] is None
+    camera = {"projection": "equirectangular", "size": [96, 48]}
+    bent = next(iter(vs.render(small_recipe(camera=camera, channels=["rgb", "depth_ray"], formats=[]))))
+    data = json.loads(json.dumps(frame_data(bent), allow_nan=False))["camera"]
+    points = np.concatenate(data["lines"]).reshape(-1, 3)
+    assert len(data["lines"]) > 10 and 0.98 < np.linalg.norm(points, axis=1).max() < 1.02 and np.ptp(points, axis=0).min() > 1.9
 
 
 def test_layers_are_those_whose_channels_are_there(small_dataset):

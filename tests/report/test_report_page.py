@@ -168,6 +168,22 @@ def test_three_canvases_show_something_and_turn(page, settle):
     assert page.inner_text("#model-facts") != name
 
 
+FRUSTUM = "([frame, size]) => import('report/scenes/frustum.js').then((m) => m.frustumLines(frame, size))"
+
+
+@pytest.mark.slow
+def test_a_camera_s_frustum_is_a_pyramid_a_box_or_the_lens_s_own_lines(page):
+    K = [[2, 0, 2], [0, 2, 1], [0, 0, 1]]
+    lines = [[0, 0, 1, 0, 0.5, 0.75, 0, 1, 0], [1, 0, 0, 0, 0, 0]]
+    pinhole, parallel, bent = (
+        page.evaluate(FRUSTUM, [{"size": [4, 2], "camera": {"K": K, **lens}}, 3])
+        for lens in ({"lines": None, "parallel": False}, {"lines": None, "parallel": True}, {"lines": lines, "parallel": False})
+    )
+    assert pinhole[:4] == [[0, 0, 0], [-3, -1.5, 3], [-3, -1.5, 3], [3, -1.5, 3]] and len(pinhole) == 16
+    assert parallel[:6] == [[-1, -0.5, 0], [-1, -0.5, 3], [-1, -0.5, 3], [1, -0.5, 3], [-1, -0.5, 0], [1, -0.5, 0]]
+    assert bent == [[0, 0, 3], [0, 1.5, 2.25], [0, 1.5, 2.25], [0, 3, 0], [3, 0, 0], [0, 0, 0]]
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(("width", "scheme"), [(390, "dark"), (1440, "light")])
 def test_no_sideways_scrolling_and_themes(open_page, width, scheme):

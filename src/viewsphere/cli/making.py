@@ -229,18 +229,19 @@ def _inspect_rig(recipe: Path, output: Path | None, changes: list[str] | None, j
     from viewsphere.run.reports.inspection import model_spec
     from viewsphere.run.reports.rig_view import recipe_rig, rig_lines, rig_mesh, sensor_facts
 
-    shown = recipe_rig(load_recipe(recipe, changes))
+    loaded = load_recipe(recipe, changes)
+    shown = recipe_rig(loaded)
     _compile_kernels()
     picture = output or Path(f"{recipe.stem}-rig.png")
     frusta = picture.with_suffix(".glb")
     write_whole(frusta, glb_bytes(rig_mesh(shown)))
     write_picture(picture, four_sides(model_spec(str(frusta))))
     if json_:
-        sensors = [asdict(facts) for facts in sensor_facts(shown)]
+        sensors = [asdict(facts) for facts in sensor_facts(shown, loaded)]
         pairs = [pair._asdict() for pair in shown.rectified]
         print_json({"sensors": sensors, "rectified": pairs, "model": str(frusta), "picture": str(picture)})
         return
-    for line in rig_lines(shown):
+    for line in rig_lines(shown, loaded):
         say(line)
     say(f"frusta: {frusta} (front: ahead of the first sensor); from four sides: {picture}")
 

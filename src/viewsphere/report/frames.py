@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
 
 from viewsphere.geometry.box3d import Box3d
+from viewsphere.geometry.frustum import frustum
+from viewsphere.geometry.lenses import Lens
 from viewsphere.labels import stand_in_for
 from viewsphere.model.instant import Viewpoint
 from viewsphere.model.sample import ObjectAnnotation, Sample
@@ -49,8 +52,15 @@ def _camera_data(camera: Camera) -> dict[str, Any]:
         "K": [numbers(row) for row in camera.K],
         "distortion": None if camera.lens.is_linear else camera.lens.name,
         "parallel": camera.lens.is_parallel,
+        "lines": None if camera.lens.is_straight or camera.lens.is_scan else _lines(camera.lens),
         "center": numbers(camera.center),
     }
+
+
+@lru_cache(maxsize=16)
+def _lines(lens: Lens) -> list[list[float]]:
+    """The lines x, y, z, x, ... of a bent lens's frustum in camera axes, at most 1 away, to a hundredth."""
+    return [[round(float(v), 2) for v in line.ravel()] for line in frustum(lens, 1.0).lines]
 
 
 def _object_data(o: ObjectAnnotation) -> dict[str, Any]:

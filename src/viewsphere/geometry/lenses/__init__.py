@@ -193,6 +193,11 @@ class LensSpec(BaseModel):
         description="`bounds(lens, R, t, vertices, is_used, triangles)`: the 2D box of what the lens shows of triangles (n, 3) "
         "of world vertices (v, 3), None without, and whether it shows all. Default: a search that needs `project` alone",
     )
+    screen: Callable[[Float], Float] | None = Field(
+        default=None,
+        description="`screen(directions)`: places (N, 3), in camera axes, of rays' directions (N, 3) on the surface on which "
+        "drawings of cameras show the picture. Default: the unit sphere, or the plane z = 1 if rays are not unit vectors",
+    )
     focal: Callable[[Any, float, float], float] | None = Field(
         default=None,
         description="`focal(parameters, fov, extent)`: the focal length, pixels, with which `extent` pixels span an angle "
@@ -332,6 +337,12 @@ class Lens:
         origins, directions = self.spec.rays(self, at.reshape(-1, 2))
         shape = (*at.shape[:-1], 3)
         return Rays(origins.reshape(shape), directions.reshape(shape))
+
+    def on_screen(self, directions: Float) -> Float:
+        """Places (N, 3) of directions (N, 3) on the surface on which drawings of cameras show the picture: a unit sphere, the
+        plane z = 1, or the lens's own.
+        """
+        return directions if self.spec.screen is None else self.spec.screen(directions)
 
     def directions(self, subdivision: int = 1, window: Window | None = None) -> Float:
         """Directions of the rays through sample centres, (H, W, 3): `subdivision` x `subdivision` samples a pixel.

@@ -5,11 +5,15 @@ from __future__ import annotations
 import math
 from typing import Any, Literal
 
+import numpy as np
+from numpy.typing import NDArray
 from pydantic import Field
 
 from viewsphere.geometry.lenses import BlenderLens, Calibration, LensOptions, LensParameters, LensSpec
 from viewsphere.geometry.lenses.shared import panorama
 from viewsphere.geometry.lenses.shared.panorama import Span, SpanField
+
+Float = NDArray[np.float64]
 
 LIMIT = math.radians(89.9)
 """The highest elevation, radians: a cylinder has no pixel for straight up. Spans end below it."""
@@ -56,10 +60,16 @@ def _as_blender(lens: Any) -> BlenderLens | None:
     return BlenderLens("PANO", "CENTRAL_CYLINDRICAL", {**across, **down, "central_cylindrical_radius": 1.0})
 
 
+def _screen(directions: Float) -> Float:
+    """Places on the upright cylinder of radius 1."""
+    return directions / np.hypot(directions[:, 0], directions[:, 2])[:, None]
+
+
 LENS = LensSpec(
     parameters=Cylindrical,
     options=Options,
     calibrate=_calibrate,
     as_blender=_as_blender,
+    screen=_screen,
     **panorama.panorama_functions(LIMIT, is_cylinder=True),
 )

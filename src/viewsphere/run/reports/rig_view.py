@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from viewsphere.assets.mesh import Material, Mesh
 from viewsphere.composing.viewpoints.sequence_poses import poses_of
+from viewsphere.geometry.frustum import frustum
 from viewsphere.geometry.rotation import transform
 from viewsphere.model.sensors.camera import Intrinsics
 from viewsphere.model.sensors.rig import Rig, Sensor
@@ -45,14 +46,11 @@ LEAST_DEPTH = 0.1
 BAR, BODY = 0.012, 0.1
 """Thickness of a frustum's edges and width of a camera's body, times the length of the edges."""
 
-ALONG = 8
-"""Number of segments of each side of a picture's border, which lenses bend."""
-
 
 @dataclass(frozen=True)
 class _SensorFacts:
-    """A sensor in words: `fov_deg` across and down, or `span_m` if its rays are parallel. `position` (metres) and `rotation`
-    (degrees) are as recipes write them.
+    """A sensor in words: `fov_deg` across and down, or `span_m` if its rays are parallel; None where
+    `distance: {fill: ...}` sets it. `position` (metres) and `rotation` (degrees) are as recipes write them.
     """
 
     name: str
@@ -75,10 +73,13 @@ def recipe_rig(recipe: Recipe) -> Rig:
         return rig_of(recipe, own) or Rig.single(own)
 
 
-def sensor_facts(rig: Rig) -> tuple[_SensorFacts, ...]:
-    """Return the facts about each sensor."""
+def sensor_facts(rig: Rig, recipe: Recipe | None = None) -> tuple[_SensorFacts, ...]:
+    """Return the facts about each sensor. The viewpoints of its recipe may set the width of the first one's pictures."""
+    is_open = recipe is not None and recipe.camera.projection is not None and recipe.camera.projection.is_open
     colors = list(COLORS)
-    return tuple(_facts(sensor, colors[i % len(colors)]) for i, sensor in enumerate(rig.sensors))
+    facts = tuple(_facts(sensor, colors[i % len(colors)]) for i, sensor in enumerate(rig.sensors))
+    same = [is_open and sensor.intrinsics == rig.sensors[0].intrinsics for sensor in rig.sensors]
+    return tuple(replace(fact, span_m=None) if is_same else fact for fact, is_same in zip(facts, same, strict=True))
 
 
 def _facts(sensor: Sensor, color: str) -> _SensorFacts:
@@ -99,14 +100,13 @@ def _angles(pose: Float) -> tuple[float, float, float]:
     return x, y, z
 
 
-def rig_lines(rig: Rig) -> Iterator[str]:
-    """The lines of text about the rig."""
-    facts = sensor_facts(rig)
+def rig_lines(rig: Rig, recipe: Recipe | None = None) -> Iterator[str]:
+    """The lines of text about the rig, and the recipe that it may belong to."""
+    facts = sensor_facts(rig, recipe)
     yield quantity(len(facts), "sensor")
     for one in facts:
         place, turn = (", ".join(f"{v:.6g}" for v in values) for values in (one.position, one.rotation))
-        (across, down), unit = (one.fov_deg, "degrees") if one.span_m is None else (one.span_m, "m")
-        lens = f"{one.size[0]} x {one.size[1]}, {across:.4g} x {down:.4g} {unit}"
+        lens = f"{one.size[0]} x {one.size[1]}, {_extent(one)}"
         yield f"  {one.name} ({one.color})"
         yield f"    lens      {lens}" + (f", {one.distortion}" if one.distortion else "")
         yield f"    position  [{place}] m (right, down, ahead)"
@@ -117,11 +117,20 @@ def rig_lines(rig: Rig) -> Iterator[str]:
         yield f"  rectified   {facts[left].name} and {facts[right].name}, baseline {baseline:.6g} m"
 
 
+def _extent(facts: _SensorFacts) -> str:
+    """What a sensor's picture spans: angles, or metres if its rays are parallel."""
+    (across, down), unit = (facts.fov_deg, "degrees") if facts.span_m is None else (facts.span_m, "m")
+    return f"{across:.4g} x {down:.4g} {unit}" if across else "width from distance: {fill: ...}"
+
+
 def rig_mesh(rig: Rig) -> Mesh:
     """The sensors' bodies and frusta, a separate colour and part for each sensor; front -Y, up +Z, metres."""
     centers = np.array([np.array(sensor.rig_from_sensor)[:3, 3] for sensor in rig.sensors])
     reach = float(np.linalg.norm(centers[:, None] - centers[None], axis=-1).max())
-    depth = max(DEPTH * reach, LEAST_DEPTH)
+    spans = [
+        max(own.width / own.fx, own.height / own.fy) for own in (s.intrinsics for s in rig.sensors) if own.lens.is_parallel
+    ]
+    depth = max(DEPTH * reach, LEAST_DEPTH, *spans)
     shapes = [
         _in_model_axes(transform(sensor.rig_from_sensor, _camera_shape(sensor.intrinsics, depth))) for sensor in rig.sensors
     ]
@@ -148,32 +157,16 @@ def _in_model_axes(points: Float) -> Float:
 
 
 def _camera_shape(own: Intrinsics, depth: float) -> Float:
-    """Triangles (T, 3, 3) of a sensor in its own axes: its body, the edges of its frustum, and a mark above its upper side."""
-    border = [ends for _, ends in _borders(own, depth)]
-    thick, body = BAR * depth, BODY * depth
-    bars = [_bar(a, b, thick) for side in border for a, b in pairwise(side)]
-    bars += [_bar(begin[0], ends[0], thick) for begin, ends in _borders(own, depth) if len(ends)]
+    """Triangles (T, 3, 3) of a sensor in its own axes: its body, the lines of its frustum, and a mark above its upper side."""
+    shape, thick, body = frustum(own.lens, depth), BAR * depth, BODY * depth
+    bars = [_bar(a, b, thick) for line in (*shape.border, *shape.edges) for a, b in pairwise(line)]
+    bars += [_bar(a, b, thick / 2) for line in shape.across for a, b in pairwise(line)]
     bars.append(_bar(np.array([0.0, 0.0, -1.2 * body]), np.array([0.0, 0.0, 0.2 * body]), body))
-    top = border[0]
-    if len(top) > 2:
+    top = shape.border[0]
+    if len(top):
         middle = top[len(top) // 2]
         bars.append(_bar(middle, middle - np.array([0.0, 1.5 * body, 0.0]), 2 * thick))
     return np.concatenate(bars)
-
-
-def _borders(own: Intrinsics, depth: float) -> list[tuple[Float, Float]]:
-    """Beginnings and ends (N, 3) of rays of this length along the upper, right, lower and left side of the picture, clockwise,
-    from corner to corner.
-    """
-    w, h = own.width, own.height
-    x, y = np.arange(w) + 0.5, np.arange(h) + 0.5
-    sides = [np.column_stack(np.broadcast_arrays(*at)) for at in ((x, 0.5), (w - 0.5, y), (x[::-1], h - 0.5), (0.5, y[::-1]))]
-    borders = list[tuple[Float, Float]]()
-    for side in sides:
-        origins, rays = own.lens.rays(side[np.unique(np.linspace(0, len(side) - 1, ALONG + 1).astype(int))])
-        known = ~np.isnan(rays).any(axis=1)
-        borders.append((origins[known], origins[known] + depth * _unit(rays[known])))
-    return borders
 
 
 def _unit(rays: Float) -> Float:

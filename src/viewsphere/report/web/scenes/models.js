@@ -1,8 +1,9 @@
 // A model near by, and the same model among its cameras.
 
-import { box, data, frameSize, models, shown, summary, categoryName } from "report/data.js";
+import { box, data, models, shown, summary, categoryName } from "report/data.js";
 import { byId, count, decimal, el, plural } from "report/dom.js";
 import { openLightbox } from "report/lightbox.js";
+import { frustumLines } from "report/scenes/frustum.js";
 import { makeStage, onSphere, themeColor } from "report/scenes/stage3d.js";
 
 const {
@@ -98,16 +99,12 @@ function frustums(key, size) {
     for (const object of frame.objects) {
       if (object.model !== key || !object.cameraFromObject || !frame.camera || frame.scan) continue;
       const m = object.cameraFromObject;
-      const { K } = frame.camera;
-      const { width, height } = frameSize(frame);
       const place = ([x, y, z]) => {
         const d = [x - m[3], y - m[7], z - m[11]];
         return [0, 1, 2].map((k) => m[k] * d[0] + m[4 + k] * d[1] + m[8 + k] * d[2]);
       };
-      const corner = (u, v) => place([((u - K[0][2]) / K[0][0]) * size, ((v - K[1][2]) / K[1][1]) * size, size]);
       const apex = place([0, 0, 0]);
-      const ring = [corner(0, 0), corner(width, 0), corner(width, height), corner(0, height)];
-      const points = ring.flatMap((p, i) => [apex, p, p, ring[(i + 1) % 4]]).flat();
+      const points = frustumLines(frame, size).flatMap(place);
       found.push({ frame, apex, points });
     }
   }
@@ -174,7 +171,8 @@ function picked(stage, event) {
   ray.params.Line.threshold = stage.camera.position.distanceTo(stage.controls.target) * 0.008;
   const all = stage.shown.children.filter((node) => node.isLineSegments).pop();
   const hit = ray.intersectObject(all)[0];
-  return hit ? stage.frustums[Math.floor(hit.index / 16)] : null;
+  let rest = hit ? hit.index : -1;
+  return hit ? stage.frustums.find((f) => (rest -= f.points.length / 3) < 0) : null;
 }
 
 function pickFrames(stage, hint) {
@@ -214,7 +212,7 @@ export function showModels() {
   const hint = el("div", { class: "hint", "aria-hidden": "true" });
   byId("model-pair").append(
     el("figure", {}, near, el("figcaption", {}, "The model in its box. Drag to turn.")),
-    el("figure", {}, wide, el("figcaption", {}, `Its cameras: dots are viewpoints, pyramids ${data.live ? "some pictures" : "the pictures shown above"}; select one to enlarge it.`)));
+    el("figure", {}, wide, el("figcaption", {}, `Its cameras: dots are viewpoints, frustums ${data.live ? "some pictures" : "the pictures shown above"}; select one to enlarge it.`)));
   const stages = [makeStage(near, "The model in 3D"), makeStage(wide, "The model among its cameras, in 3D")];
   if (!stages[0] || !stages[1]) return;
   wide.append(hint);

@@ -1,6 +1,7 @@
 // The rig of a sequence among its objects: the frusta of its sensors at an instant, and the way it goes.
 
-import { box, categoryToken, frameSize } from "report/data.js";
+import { box, categoryToken } from "report/data.js";
+import { frustumLines } from "report/scenes/frustum.js";
 import { makeStage, themeColor } from "report/scenes/stage3d.js";
 
 const { BufferAttribute, BufferGeometry, Group, LineBasicMaterial, LineSegments } = globalThis.viewsphereVendor;
@@ -13,19 +14,10 @@ function lines(points, tone, opacity = 1) {
 
 const center = (frame) => [3, 7, 11].map((i) => frame.worldFromCamera[i]);
 
-/** A pyramid from the sensor's centre to its picture, so far ahead, or a box if its rays are parallel; a LiDAR's shows where ahead is. */
+/** The lines of a camera's frustum in world axes. */
 function frustum(frame, size) {
   const m = frame.worldFromCamera;
-  const { K } = frame.camera;
-  const { width, height } = frameSize(frame);
-  const place = (p) => [0, 4, 8].map((row) => m[row] * p[0] + m[row + 1] * p[1] + m[row + 2] * p[2] + m[row + 3]);
-  const { parallel } = frame.camera;
-  const spread = parallel ? 1 : size;
-  const beside = frame.scan ? (u, v) => [(u / width - 0.5) * 0.4 * size, (v / height - 0.5) * 0.4 * size] : (u, v) => [((u - K[0][2]) / K[0][0]) * spread, ((v - K[1][2]) / K[1][1]) * spread];
-  const ringAt = (z) => [[0, 0], [width, 0], [width, height], [0, height]].map(([u, v]) => place([...beside(u, v), z]));
-  const ring = ringAt(size);
-  const begin = parallel ? ringAt(0) : ring.map(() => center(frame));
-  return ring.flatMap((p, i) => [...begin[i], ...p, ...p, ...ring[(i + 1) % 4], ...(parallel ? [...begin[i], ...begin[(i + 1) % 4]] : [])]);
+  return frustumLines(frame, size).flatMap((p) => [0, 4, 8].map((row) => m[row] * p[0] + m[row + 1] * p[1] + m[row + 2] * p[2] + m[row + 3]));
 }
 
 const edgesOf = (corners) => box.edges.flatMap(([a, b]) => [...corners.slice(3 * a, 3 * a + 3), ...corners.slice(3 * b, 3 * b + 3)]);
