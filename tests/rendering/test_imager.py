@@ -3,6 +3,7 @@
 import io
 import itertools
 import math
+import re
 import tarfile
 
 import numpy as np
@@ -263,6 +264,9 @@ def test_neither_the_sun_nor_darkness_decides_the_exposure():
     assert (dark.seconds, dark.iso) == (1 / 30, 800)
 
 
+SLOW = ("blend",)
+"""Formats that start a program of minutes, and hold no pictures."""
+
 VIEWS = {"azimuth": [30, 75], "elevation": 20, "distance": 1.0}
 
 
@@ -441,17 +445,91 @@ def test_webdataset_and_huggingface_hold_the_mosaic(tmp_path):
         assert np.array_equal(np.asarray(Image.open(io.BytesIO(row["bayer"]["bytes"]))), mosaic)
 
 
-@pytest.mark.parametrize("name", plugins.shipped("formats"))
-def test_formats_of_pictures_refuse_a_mosaic_alone_with_words(name):
-    spec, planned = plugins.load(FormatSpec, name), plan(recipe_of(channels=["bayer", "depth", "instances"]))
-    if spec.writer is None:
-        return
-    try:
-        check_formats(planned, [FormatEntry(name=name)], planned.recipe.channels)
-    except UserError as error:
-        assert "expected" in str(error) and "found" in str(error) and len(str(error).splitlines()) == 1
-    else:
-        assert "rgb" not in (spec.channels or ())
+def answers(channels, **changes):
+    """Each shipped format that can be written, with its refusal of a data set of these channels, or None."""
+    planned = plan(recipe_of(channels=channels, **changes))
+    for name in plugins.shipped("formats"):
+        if plugins.load(FormatSpec, name).writer is not None:
+            try:
+                check_formats(planned, [FormatEntry(name=name)], planned.recipe.channels)
+            except UserError as error:
+                yield name, str(error)
+            else:
+                yield name, None
+
+
+def exported(folder, channels, formats):
+    """The files of each export of a data set."""
+    generate(recipe_of(channels=channels, formats=formats, splits={"train": 1.0}), folder, workers=0)
+    return {name: sorted(file for file in (folder / name).rglob("*") if file.is_file()) for name in formats}
+
+
+def test_formats_refuse_a_mosaic_alone_with_words_or_hold_it_or_take_no_pictures(tmp_path):
+    told = dict(answers(["bayer", "depth", "instances"]))
+    for name, refusal in told.items():
+        if refusal is not None:
+            assert re.search(rf"{name}.*expected|expected.*format {name}", refusal) and "found" in refusal, refusal
+            assert len(refusal.splitlines()) == 1
+    assert "bayer alone: add rgb" in told["native"] and "bayer alone: add rgb" in told["csv"]
+    formats = [name for name, refusal in told.items() if refusal is None and name not in SLOW]
+    alone = exported(tmp_path / "alone", ["bayer", "depth", "instances"], formats)
+    colors = exported(tmp_path / "colors", ["rgb", "depth", "instances"], formats)
+    for name in formats:
+        if not any(b"bayer" in file.read_bytes() for file in alone[name]):
+            files = [[str(f.relative_to(tmp_path / n)) for f in x[name]] for n, x in (("alone", alone), ("colors", colors))]
+            assert files[0] == files[1], name
+
+
+def test_formats_refuse_a_sensor_that_keeps_the_mosaic_alone():
+    sensors = {"a": {"channels": ["rgb"]}, "b": {"channels": ["bayer"]}}
+    told = dict(answers(["rgb", "bayer"], rig={"sensors": sensors}))
+    assert all("expected" in told[name] for name in ("native", "csv", "coco")) and told["webdataset"] is None
+
+
+def test_an_imager_stands_behind_a_rolling_shutter():
+    camera = {"fov_deg": 40, "size": [96, 72], "rolling": {"readout": 0.04}}
+    quiet = {"full_well": 1e9, "read_noise": 0.0, "bits": 16, "cos4": False, "black_level": 0, "exposure": 1e-4, "iso": 100}
+    moving = {
+        "models": [
+            {"source": "zoo:post_box", "scale": {"length": 0.18}, "motion": {"kind": "constant", "velocity": [3, 0, 0]}}
+        ],
+        "time": {"frames": 2, "fps": 20},
+        "viewpoints": {"azimuth": [0], "distance": 1.0},
+    }
+    names = ["rgb", "rgb_linear", "instances", "depth"]
+    plain = render(recipe_of(channels=names, **moving, **{"camera": camera}))
+    taken = render(recipe_of(channels=[*names, "bayer"], **moving, **{"camera": {**camera, "imager": quiet}}))
+    still = render(
+        recipe_of(channels=[*names, "bayer"], **moving, **{"camera": {"fov_deg": 40, "size": [96, 72], "imager": quiet}})
+    )
+    for one, other, fixed in zip(plain, taken, still, strict=True):
+        assert all(np.array_equal(one.channels[name], other.channels[name]) for name in names[1:])
+        assert repr(one.objects) == repr(other.objects)
+        scale = [
+            np.median(s.bayer[::2, 1::2][s.instances[::2, 1::2] == 0] / s.rgb_linear[::2, 1::2, 1][s.instances[::2, 1::2] == 0])
+            for s in (other, fixed)
+        ]
+        assert scale[0] == pytest.approx(scale[1], rel=0.02)
+        assert not np.array_equal(other.instances, fixed.instances) and not np.array_equal(other.bayer, fixed.bayer)
+
+
+def test_lenses_at_one_place_have_one_imager_and_noise_of_their_own():
+    camera = {"fov_deg": 40, "size": [96, 72], "imager": "phone"}
+    twins = {
+        "same": {"fov_deg": 40, "size": [96, 72]},
+        "wide": {"projection": "cylindrical", "size": [96, 72], "span": {"horizontal": 90}},
+    }
+    recipe = recipe_of(channels=["rgb", "bayer"], camera={**camera, "also": twins})
+    assert len({sensor.imager for sensor in plan(recipe).rig.sensors}) == 1
+    shown = {}
+    for sample in render(recipe):
+        shown.setdefault(sample.sensor, []).append(sample.bayer)
+    assert list(shown) == ["camera", "same", "wide"]
+    alone = [sample.bayer for sample in render(recipe_of(channels=["rgb", "bayer"], camera=camera))]
+    assert all(map(np.array_equal, shown["camera"], alone))
+    difference = shown["same"][0].astype(int) - shown["camera"][0]
+    assert 0 < np.abs(difference).mean() < 30 and abs(difference.mean()) < 1
+    assert shown["wide"][0].shape == (72, 96)
 
 
 def test_a_mosaic_is_drawn_as_greys_up_to_its_largest_number():

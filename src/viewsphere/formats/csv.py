@@ -22,7 +22,9 @@ from typing import Any
 from pydantic import Field
 
 from viewsphere.files import open_file
+from viewsphere.formats import Scope
 from viewsphere.formats.shared.writing.export_files import Expected, check_files, put
+from viewsphere.formats.shared.writing.refusals import no_lone_mosaic
 from viewsphere.model.channel import ALL_PICTURES
 from viewsphere.model.fields.frozen import Frozen
 from viewsphere.model.sample import ObjectAnnotation, Sample
@@ -161,6 +163,11 @@ def _frame_of(row: bytes) -> int | None:
     return int(cells[1]) if len(cells) == len(HEAD) and cells[1].isdecimal() else None
 
 
+def _refuses(scope: Scope, options: _Options) -> Iterator[str]:
+    """Reasons to refuse: pictures that rows cannot name."""
+    yield from no_lone_mosaic(scope)
+
+
 FORMAT = FormatSpec(
     parallel_rays=True,
     rolling=True,
@@ -172,6 +179,7 @@ FORMAT = FormatSpec(
     names_credits=False,
     pictures=ALL_PICTURES,
     panoramas=True,
+    refuses=_refuses,
     writer=_writer,
     preparer=_preparer,
     verify=_verify,

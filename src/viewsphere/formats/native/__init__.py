@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from viewsphere.formats import Scope
-from viewsphere.formats.shared.writing.refusals import any_view
+from viewsphere.formats.shared.writing.refusals import any_view, no_lone_mosaic
 from viewsphere.model.channel import ALL_PICTURES
 from viewsphere.plugins.format import FormatSpec, Remark
 
@@ -32,8 +32,9 @@ if TYPE_CHECKING:
 
 
 def _refuses(scope: Scope) -> Iterator[str]:
-    """Reasons to refuse: no picture has a known camera and viewpoint."""
+    """Reasons to refuse: no picture has a known camera and viewpoint, or colours."""
     yield from any_view(scope)
+    yield from no_lone_mosaic(scope)
 
 
 def _writer(

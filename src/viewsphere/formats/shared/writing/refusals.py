@@ -7,7 +7,7 @@ import re
 from collections.abc import Iterator, Sequence
 
 from viewsphere.formats import Scope
-from viewsphere.model.channel import missing
+from viewsphere.model.channel import MOSAIC, missing, picture_of
 from viewsphere.model.sample import Sample
 from viewsphere.model.sensors.camera import Intrinsics
 
@@ -71,6 +71,17 @@ def sequences(scope: Scope) -> Iterator[str]:
     if not scope.is_moving:
         found = "imported pictures, of which nobody knows when they were taken" if scope.pictures else "still pictures"
         yield f"expected sequences (a recipe's time); found {found}"
+
+
+def no_lone_mosaic(scope: Scope) -> Iterator[str]:
+    """Reasons to refuse, for a format that takes the pictures that are there, but no digital numbers of an imager: a camera has
+    nothing else.
+    """
+    sensors = scope.rig.sensors if scope.rig is not None else ()
+    for kept in [sensor.kept_channels(scope.channels) for sensor in sensors] or [scope.channels]:
+        if MOSAIC in kept and picture_of(kept) is None:
+            yield f"expected colours; found {MOSAIC} alone: add rgb to channels, beside {MOSAIC}"
+            return
 
 
 def stereo(scope: Scope) -> Iterator[str]:
