@@ -230,6 +230,22 @@ def test_each_sensor_keeps_the_channels_that_its_lens_has():
     assert kept(channels=["depth", "instances"]) == [("depth", "instances"), ("instances",)]
 
 
+def test_a_sensor_beside_a_stereo_pair_of_other_lenses_has_no_disparity():
+    channels = ["rgb", "disparity", "instances"]
+    around, right = MIXED["sensors"]["around"], {"position": [0.1, 0, 0]}
+    less = ("rgb", "instances")
+    assert kept(rig={"sensors": {"a": {}, "b": right, "around": around}}, channels=channels) == [tuple(channels)] * 2 + [less]
+    below = {**around, "position": [0, 0.2, 0]}
+    assert (
+        kept(rig={"sensors": {"front": {}, "upper": around, "lower": below}}, channels=channels)
+        == [less] + [tuple(channels)] * 2
+    )
+    pinholes = {"a": {}, "b": right, "c": {"position": [0, 0, 1]}}
+    assert kept(rig={"sensors": pinholes}, channels=channels) == [tuple(channels)] * 3  # NaN, as ever
+    with pytest.raises(RecipeError, match="channels: expected a rig with two rectified sensors"):
+        kept(channels=channels)
+
+
 def test_a_channel_that_a_sensor_lists_and_its_lens_lacks_is_an_error():
     for entry in ({"channels": ["rgb", "depth"]}, {"channels": ["depth"]}):
         rig = {"sensors": {**MIXED["sensors"], "around": {**MIXED["sensors"]["around"], **entry}}}

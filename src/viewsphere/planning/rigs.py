@@ -76,21 +76,26 @@ def with_distances(recipe: Recipe, rig: Rig) -> Recipe:
 
 def _by_lens(recipe: Recipe, rig: Rig) -> Rig:
     """The rig whose sensors without a list of channels keep those that their lenses have, if other sensors keep the rest."""
-    held = [{n for n in sensor.kept_channels(recipe.channels) if not _refused(n, sensor)} for sensor in rig.sensors]
+    kept = [sensor.kept_channels(recipe.channels) for sensor in rig.sensors]
+    held = [{n for n in names if not _refused(n, rig, i)} for i, names in enumerate(kept)]
     some = set[str]().union(*held)
     sensors = list[Sensor]()
-    for sensor, mine in zip(rig.sensors, held, strict=True):
-        kept = sensor.kept_channels(recipe.channels)
-        is_less = sensor.channels is None and sensor.lidar is None and mine < set(kept) <= some
-        left = tuple(name for name in kept if name in mine)
+    for sensor, names, mine in zip(rig.sensors, kept, held, strict=True):
+        is_less = sensor.channels is None and sensor.lidar is None and mine < set(names) <= some
+        left = tuple(name for name in names if name in mine)
         sensors.append(sensor.model_copy(update={"channels": left}) if is_less and left else sensor)
     return rig.model_copy(update={"sensors": tuple(sensors)})
 
 
-def _refused(name: str, sensor: Sensor) -> bool:
-    """Return whether a sensor's lens rules out a channel."""
-    label = label_named(name)
-    return label is not None and label.refuses is not None and label.refuses(sensor.intrinsics) is not None
+def _refused(name: str, rig: Rig, number: int) -> bool:
+    """Return whether a sensor's lens rules out a channel, or, beside panoramas, the lack of an equal lens that it needs."""
+    label, sensor = label_named(name), rig.sensors[number]
+    if label is None:
+        return False
+    if label.refuses is not None and label.refuses(sensor.intrinsics) is not None:
+        return True
+    has_panoramas = any(not other.intrinsics.lens.has_depth for other in rig.sensors if other.lidar is None)
+    return has_panoramas and requires(label.needs, Partner) and rig.partner(number) is None
 
 
 def _with_shutter(rig: Rig, rolling: Rolling | None) -> Rig:
