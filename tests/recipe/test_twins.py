@@ -57,10 +57,52 @@ def test_labels_of_a_twin_are_those_of_its_own_lens_at_the_same_points(tmp_path)
     assert inside.sum() > 100 and same.mean() > 0.9  # but for edges
 
 
+K = [[81, 0.5, 47], [0, 79, 35], [0, 0, 1]]
+LENSES = {
+    "focal": (CAMERA, [[80, 0, 48], [0, 80, 36], [0, 0, 1]]),
+    "matrix": ({"size": [96, 72], "K": K, "distortion": BENT}, K),
+    "centre": ({**CAMERA, "principal_point": [40, 30]}, [[80, 0, 40], [0, 80, 30], [0, 0, 1]]),
+    "angle": ({"size": [96, 72], "fov_deg": 60, "distortion": BENT}, None),
+}
+
+
+@pytest.mark.parametrize("name", LENSES)
+def test_an_empty_twin_of_a_bent_lens_is_the_pinhole_with_its_matrix(name):
+    camera, matrix = LENSES[name]
+    recipe = small_recipe(camera={**camera, "also": {"pinhole": {}, "masks": {"channels": ["instances"]}}}, formats=[])
+    bent, straight, masks = plan(recipe).rig.sensors
+    assert straight.intrinsics == bent.intrinsics.model_copy(update={"distortion": None}) == masks.intrinsics
+    assert masks.channels == ("instances",) and bent.intrinsics.distortion is not None
+    np.testing.assert_array_equal(straight.intrinsics.K, bent.intrinsics.K if matrix is None else matrix)
+    assert type(recipe).model_validate(recipe.model_dump(mode="json")).digest == recipe.digest
+
+
+@pytest.mark.parametrize(
+    "camera",
+    [
+        {"size": [96, 72], "focal_px": 80},
+        {**CAMERA, "focal_px": {"uniform": [70, 80]}},
+        {"projection": "cylindrical", "size": [96, 40], "span": {"horizontal": 120}},
+        {"fov_deg": 40, "size": [96, 72]},
+    ],
+)
+def test_an_empty_twin_of_another_lens_is_an_error(camera):
+    with pytest.raises(
+        RecipeError, match=r"camera\.also\.pinhole: expected a mapping with one of fov_deg, .*, or \{\} beside a bent"
+    ) as error:
+        small_recipe(camera={**camera, "also": {"pinhole": {}}}, formats=[])
+    assert "\n" not in str(error.value)
+
+
+def test_a_wrong_lens_beside_an_empty_twin_is_named():
+    with pytest.raises(RecipeError, match=r"camera\.focal_px"):
+        small_recipe(camera={**CAMERA, "focal_px": -1, "also": {"pinhole": {}}}, formats=[])
+
+
 @pytest.mark.parametrize(
     ("also", "told"),
     [
-        ({"pinhole": {}}, "camera.also.pinhole: expected a mapping with one of fov_deg, .*; found"),
+        ({"pinhole": {"size": [8, 8]}}, "camera.also.pinhole: expected a mapping with one of fov_deg, .*; found"),
         ({"pinhole": True}, "camera.also.pinhole: expected a mapping with one of fov_deg"),
         ({"camera": PINHOLE}, "camera.also.camera: expected another name; found camera"),
         ({"pinhole": {"fov_deg": 200}}, "camera.also.pinhole.fov_deg: expected a number less than 180; found 200"),

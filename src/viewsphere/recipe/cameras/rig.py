@@ -8,6 +8,7 @@ from typing import Annotated, Any, Literal, cast
 
 from pydantic import BeforeValidator, Discriminator, Field, Tag, ValidationError, field_validator, model_validator
 
+from viewsphere.errors import RecipeError
 from viewsphere.model.fields.frozen import Frozen
 from viewsphere.model.fields.numbers import Count, Length, Metres, Number, Positive
 from viewsphere.model.sensors.rig import CAMERA
@@ -154,12 +155,31 @@ def with_twins(given: Any) -> Any:
     if given.get("rig") is not None:
         with error_at("camera", "also"):
             raise ValueError("expected none beside rig, which has all sensors; found some: list them there")
-    entries = cast("Mapping[str, Any]", twins)
+    rest = {field: value for field, value in cast("Mapping[str, Any]", camera).items() if field != "also"}
+    straight = _without_distortion(rest)
+    entries = {n: {**straight, **v} if _has_no_lens(v) else v for n, v in cast("Mapping[str, Any]", twins).items()}
     for name, values in entries.items():
         with error_at("camera", "also", str(name)):
             _check_twin(name, values)
-    rest = {field: value for field, value in cast("Mapping[str, Any]", camera).items() if field != "also"}
     return {**given, "camera": rest, "rig": {"kind": "sensors", "sensors": {CAMERA: {}, **entries}}}
+
+
+def _without_distortion(camera: Mapping[str, Any]) -> dict[str, Any]:
+    """Size and K of a bent lens, for its pinhole twin; nothing if the lens is straight or drawn. For a wrong lens, whose own
+    error follows, K is None.
+    """
+    try:
+        entry = CameraEntry.model_validate(camera)
+        if entry.distortion is None or entry.is_random or entry.of_viewpoints:
+            return {}
+        return {"size": list(entry.size), "K": entry.intrinsics.K.tolist()}
+    except (ValidationError, RecipeError):
+        return {"K": None}
+
+
+def _has_no_lens(values: Any) -> bool:
+    """Return whether a twin has no field of a lens, so that it is the pinhole with the camera's K."""
+    return isinstance(values, Mapping) and not any(field in values for field in LENS_FIELDS)
 
 
 def _check_twin(name: str, values: Any) -> None:
@@ -169,7 +189,8 @@ def _check_twin(name: str, values: Any) -> None:
     if str(name).casefold() == CAMERA:
         raise ValueError(f"expected another name; found {name}, the first camera's")
     if not isinstance(values, Mapping) or not any(lens in values for lens in OWN_LENSES):
-        raise ValueError(f"expected a mapping with one of {', '.join(OWN_LENSES)}; found {shown(values)}")
+        names = ", ".join(OWN_LENSES)
+        raise ValueError(f"expected a mapping with one of {names}, or {{}} beside a bent lens; found {shown(values)}")
     for field in ("position", "rotation", "look", "lidar"):
         if field in values:
             raise ValueError(f"expected none of position, rotation, look and lidar; found {field}: list all sensors in rig")

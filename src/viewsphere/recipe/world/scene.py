@@ -141,7 +141,7 @@ class CameraEntry(WithProjection):
     also: dict[str, dict[str, Any]] | None = Field(
         default=None,
         description="further cameras at the same place that look the same way, by name, each with its own lens: {pinhole: "
-        "{fov_deg: 90}}; the recipe then has a rig of all",
+        "{fov_deg: 90}}, or {pinhole: {}} for the same K without distortion; the recipe then has a rig of all",
     )
 
     OMIT_IF_NONE = ("imager", "rolling", "also")
