@@ -51,10 +51,11 @@ class Textures(NamedTuple):
 class PictureRays(NamedTuple):
     """One picture's rays: direction = rotation.T @ ray.
 
-    eye (3,); rotation (3, 3) world to camera; lens (2, 3): ray = lens @ (column, row, 1) in samples; rays (S, 3), empty for a
-    pinhole; columns: samples in a row; pixel: a pixel's size at distance 1; scale: factor of depths; places (S, 2): column and
-    row of samples that are not on a grid, otherwise empty. shifts (S, 3): from the eye to where each ray begins, for parallel
-    rays and rolling shutters; otherwise empty. is_parallel: whether pixels have one size at any distance.
+    eye (3,); rotation (3, 3) world to camera; lens (2, 3): ray = lens @ (column, row, 1) in samples for a pinhole, and -1 for
+    panoramas, whose pixels narrow towards the poles; rays (S, 3), empty for a pinhole; columns: samples in a row; pixel: a
+    pixel's size at distance 1; scale: factor of depths; places (S, 2): column and row of samples that are not on a grid,
+    otherwise empty. shifts (S, 3): from the eye to where each ray begins, for parallel rays and rolling shutters; otherwise
+    empty. is_parallel: whether pixels have one size at any distance.
     """
 
     eye: Float32

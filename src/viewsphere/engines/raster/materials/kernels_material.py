@@ -113,6 +113,7 @@ def look_up(count, view, surfaces, textures, b, which):
     q = np.empty(QUAD_ROWS * QUADS, np.float32)
     places = np.empty(PLACE_ROWS * QUADS, np.int32)
     is_lens = f4(view.rays.shape[0] > 0)
+    narrows = view.lens[0, 0] < f4(0)
     begin = 0
     while begin < count:
         m = U(which[begin])
@@ -129,6 +130,8 @@ def look_up(count, view, surfaces, textures, b, which):
                 own = b[U(start) :]
                 size = min(CHUNK, stop - start)
                 _barycentric_motion(size, view.rotation, is_lens, own, c)
+                if narrows:
+                    _panorama_motion(size, view.rotation, own, c)
                 for n in range(U(bundles.shape[0])):
                     if bundles[n] < 0:
                         break
@@ -200,6 +203,20 @@ def _barycentric_motion(rotation, is_lens, b, c):
     down = tuple(where(lens, down[n], rotation.one(3 + n)) for n in range(3))
     c[G_X], c[H_X] = dot(across, g) * scale, dot(across, h) * scale
     c[G_Y], c[H_Y] = dot(down, g) * scale, dot(down, h) * scale
+
+
+@lanewise
+def _panorama_motion(rotation, b, c):
+    """The same for a panorama, whose pixels are as wide as the cosine of their elevation: the length of the first product."""
+    v, first, second = b.get(VX, VY, VZ), b.get(AX, AY, AZ), b.get(BX, BY, BZ)
+    g, h = cross(second, v), cross(v, first)
+    volume = dot(first, g)
+    scale = b[PIXEL] * volume / most(volume * volume, 1e-36)
+    across = cross(tuple(rotation.one(3 + n) for n in range(3)), v)
+    down = cross(v, across)
+    per = scale / root(most(dot(across, across), 1e-12))
+    c[G_X], c[H_X] = dot(across, g) * scale, dot(across, h) * scale
+    c[G_Y], c[H_Y] = dot(down, g) * per, dot(down, h) * per
 
 
 @lanewise

@@ -33,6 +33,8 @@ from viewsphere.truth.raster.visibility import Visibility, lens_rays
 
 _NO_RAYS = np.zeros((0, 3), np.float32)
 _NO_PLACES = np.zeros((0, 2), np.float32)
+_NARROWS = np.full((2, 3), -1, np.float32)
+"""`PictureRays.lens` of panoramas, whose pixels narrow towards the poles."""
 NO_SPLIT = np.zeros((0, 0), np.float32)
 
 
@@ -301,7 +303,7 @@ def view_of(
     return PictureRays(
         ((camera.center - baked.origin) / baked.unit).astype(np.float32),
         camera.R.astype(np.float32),
-        inverse_camera_matrix(camera.intrinsics)[:2].astype(np.float32),
+        inverse_camera_matrix(camera.intrinsics)[:2].astype(np.float32) if camera.lens.has_depth else _NARROWS,
         rays,
         np.uint32(camera.width),
         np.float32(1 / np.sqrt(camera.intrinsics.fx * camera.intrinsics.fy)),
@@ -310,6 +312,9 @@ def view_of(
         shifts,
         camera.lens.is_parallel,
     )
+
+
+_NARROWING = np.full((2, 3), -1, np.float32)
 
 
 @lru_cache(maxsize=4)
