@@ -91,7 +91,7 @@ def _seen(lens: Lens, xy: Float) -> Float:
 
 
 def _has_ray(lens: Lens, xy: Float) -> NDArray[np.bool_]:
-    return ~np.isnan(lens.rays(xy).directions).any(axis=1)
+    return np.isfinite(lens.rays(xy).directions[:, 0])
 
 
 def _distinct(line: Float) -> Float:
