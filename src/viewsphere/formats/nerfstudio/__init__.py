@@ -131,10 +131,9 @@ def _refuses(scope: Scope, options: _Options) -> Iterator[str]:
         yield "expected kind: instant-ngp for pictures of scene-linear light, or rgb in channels; found kind: " + options.kind
     yield from refusals.lacking_labels(scope, _needs(options))
     yield from refusals.known_cameras(scope)
-    cameras = dict(refusals.lenses(scope))
-    problems = ((name, _lens_problem(lens, options.kind)) for name, lens in cameras.items())
+    problems = ((name, _lens_problem(lens, options.kind)) for name, lens in refusals.lenses(scope))
     yield from (f"{problem} of {name}" for name, problem in problems if problem)
-    if len(models := {_model_of(lens) for lens in cameras.values()}) > 1:
+    if len(models := {_model_of(lens) for lens in dict(refusals.lenses(scope)).values()}) > 1:
         yield f"expected lenses of one model; found {' and '.join(sorted(models))}"
 
 

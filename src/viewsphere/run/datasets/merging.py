@@ -148,8 +148,9 @@ def _check_alike(datasets: Sequence[Dataset]) -> None:
                 f"{', '.join(other.plan.channels)}: join them all the same with --mixed"
             )
         if _lenses(other) != _lenses(first):
+            wanted, found = _told_apart(first, other)
             raise UserError(
-                f"{other.root}: expected the camera of {first.root}, {_shown(first)}; found {_shown(other)}: "
+                f"{other.root}: expected the camera of {first.root}, {wanted}; found {found}: "
                 "join them all the same with --mixed"
             )
 
@@ -161,13 +162,23 @@ def _lenses(dataset: Dataset) -> set[Intrinsics | None]:
     return set(None if camera is None else camera.intrinsics for camera in cameras)
 
 
-def _shown(dataset: Dataset) -> str:
+def _told_apart(first: Dataset, other: Dataset) -> tuple[str, str]:
+    """The cameras of two data sets in words: with six digits, or with all digits if six show no difference."""
+    short, whole = ((_shown(first, digits), _shown(other, digits)) for digits in (6, 17))
+    return short if short[0] != short[1] else whole
+
+
+def _shown(dataset: Dataset, digits: int) -> str:
     lenses = [lens for lens in _lenses(dataset) if lens]
     if len(lenses) != 1:
         return "an unknown one" if not lenses else "several"
     i = lenses[0]
-    bent = "" if i.lens.is_linear else f", {i.lens.name}"
-    return f"{i.width}x{i.height} fx {i.fx:.6g} fy {i.fy:.6g} cx {i.cx:.6g} cy {i.cy:.6g}{bent}"
+    named = {"fx": i.fx, "fy": i.fy, "cx": i.cx, "cy": i.cy, **({"skew": i.skew} if i.skew else {})}
+    matrix = " ".join(f"{name} {value:.{digits}g}" for name, value in named.items())
+    numbers = () if i.distortion is None else i.distortion.numbers
+    bent = " ".join((i.lens.name, *(f"{number:.{digits}g}" for number in numbers)))
+    rolling = i.rolling and f"a rolling shutter of {i.rolling.readout:.{digits}g} s, {i.rolling.direction}"
+    return ", ".join(filter(None, (f"{i.width}x{i.height} {matrix}", "" if i.lens.is_linear else bent, rolling)))
 
 
 def _reconciled(datasets: Sequence[Dataset]) -> tuple[tuple[Category, ...], tuple[str, ...], tuple[_Source, ...]]:

@@ -14,6 +14,7 @@ from viewsphere.formats.shared.writing.refusals import central, depth_lenses, gl
 from viewsphere.labels import label_named, label_names
 from viewsphere.model.channel import PASSES, missing, picture_of
 from viewsphere.model.sample import Sample
+from viewsphere.model.sensors.camera import Intrinsics
 from viewsphere.planning.plan import Plan
 from viewsphere.plugins.format import FormatSpec
 from viewsphere.recipe.formats import FormatEntry
@@ -54,8 +55,9 @@ def scope_of(dataset: Dataset) -> Scope:
     )
     if any(shots):
         known = replace(known, channels=tuple(dict.fromkeys((*known.channels, *label_names()))), annotations=label_names())
-    if shots and shots[0] and all(shots):
-        return replace(known, rig=shots[0].rig)
+    rigs = tuple(dict.fromkeys(shot.rig for shot in shots if shot is not None))
+    if rigs and all(shots):
+        return replace(known, rig=rigs[0], later_rigs=rigs[1:])
     pictures = tuple(chain.from_iterable(map(_telling, dataset.samples_of_parts)))
     asked = dict.fromkeys(name for sample in pictures for name in sample.requested)
     return replace(known, annotations=tuple(dict.fromkeys((*known.annotations, *asked))), pictures=pictures)
@@ -77,13 +79,14 @@ def scope_of_foreign(foreign: ForeignDataset) -> Scope:
 
 
 def _telling(samples: Iterable[Sample]) -> tuple[Sample, ...]:
-    """The first sample, and the first sample for each other combination of known facts: a camera, a viewpoint, an object's
-    position. At most LOOKED_AT samples are examined.
+    """The first sample, and the first sample for each other combination of known facts: a camera and its lens, a viewpoint, an
+    object's position. At most LOOKED_AT samples are examined.
     """
-    kinds: dict[tuple[bool, bool, bool], Sample] = {}
+    kinds: dict[tuple[Intrinsics | None, bool, bool], Sample] = {}
     for sample in islice(samples, LOOKED_AT):
         is_placed = any(o.is_placed for o in sample.objects)
-        kinds.setdefault((sample.known_camera is not None, sample.known_pose is not None, is_placed), sample)
+        lens = None if sample.known_camera is None else sample.known_camera.intrinsics
+        kinds.setdefault((lens, sample.known_pose is not None, is_placed), sample)
     return tuple(kinds.values())
 
 
@@ -111,7 +114,12 @@ def refuse(entries: Sequence[FormatEntry], scope: Scope, where: object) -> None:
 
 
 def refusals(spec: FormatSpec, entry: FormatEntry, scope: Scope) -> Iterator[str]:
-    """Yield the reasons why a format with these options cannot hold a data set."""
+    """Yield the reasons why a format with these options cannot hold a data set: those of the rig of each part, once each."""
+    scopes = (replace(scope, rig=rig, later_rigs=()) for rig in (scope.rig, *scope.later_rigs))
+    yield from dict.fromkeys(chain.from_iterable(_refusals_of_rig(spec, entry, one) for one in scopes))
+
+
+def _refusals_of_rig(spec: FormatSpec, entry: FormatEntry, scope: Scope) -> Iterator[str]:
     yield from not_held(spec, entry, scope)
     yield from lacking_labels(scope, spec.channels or ())
     if not spec.lidar:

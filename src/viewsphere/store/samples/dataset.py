@@ -408,14 +408,17 @@ class Dataset(Shown, Sequence[Sample]):
             is_short = any("camera" not in record for record in records)
         except (OSError, TypeError, ValueError) as error:
             raise _damaged(file, error) from None
-        shot = self.labelled(key) if is_short else None
+        shot = self.labelled(key) if is_short or any(map(_rolls, records)) else None
         if shot is None:
             return _Records(file, records)
+        known = ShotRecords(shot, self._facts, str(file), str(self.root))
+        if not is_short:
+            return _Records(file, records, rows=known)
         try:
             files = self.store.channel_files(key, shot)
         except LookupError as error:
             raise _damaged(file.with_name("shot.json"), error) from None
-        return _Records(file, records, ShotRecords(shot, self._facts, str(file), str(self.root)), files)
+        return _Records(file, records, known, files, known)
 
     def labelled(self, key: str) -> Shot | None:
         """A finished shot as `Store.labelled` gives it.
@@ -448,6 +451,8 @@ class Dataset(Shown, Sequence[Sample]):
             if "camera" in record or records.shot is None:
                 files: dict[str, str] = record["files"] | supplied
                 whole = from_whole_sample(record, _ChannelFiles(self.root, files, self._manifests), files)
+                if records.rows is not None and _rolls(record):
+                    whole = records.rows.with_rows(place, whole)
                 return self._named(_with_options(whole, options))
             kept, number = records.shot.kept_channels(place), f"{record['index']:08d}"
             files = {name: head + number + tail for name, head, tail in records.files if name in kept}
@@ -651,16 +656,24 @@ def _with_options(sample: Sample, options: Options) -> Sample:
     return replace(sample, options={**sample.options, **options}) if options else sample
 
 
+def _rolls(record: Mapping[str, Any]) -> bool:
+    """Return whether a whole record has a camera with a rolling shutter."""
+    camera: Any = record.get("camera")
+    lens: Any = camera.get("intrinsics") if isinstance(camera, dict) else None
+    return isinstance(lens, dict) and lens.get("rolling") is not None
+
+
 @dataclass(frozen=True, eq=False)
 class _Records:
     """A shot's frames.json. For short records, it comes with the shot and the names of its channels' files (channel, and the
-    path before and after a sample's number).
+    path before and after a sample's number). `rows` gives the row poses of rolling shutters, None without a stored shot.
     """
 
     file: Path
     records: list[dict[str, Any]]
     shot: ShotRecords | None = None
     files: tuple[tuple[str, str, str], ...] = ()
+    rows: ShotRecords | None = None
 
     @property
     def sequences(self) -> list[str]:

@@ -7,7 +7,7 @@ shot and the models. An imported sample is stored as a whole record.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from typing import Any
 
@@ -62,7 +62,9 @@ def _extra(requested: Sequence[str], plain: Mapping[str, Any]) -> dict[str, Any]
 
 
 def whole_sample(sample: Sample) -> dict[str, Any]:
-    """The whole record of a sample, with everything but its channels' pixels; NaN becomes null."""
+    """The whole record of a sample, with everything but its channels' pixels and the poses of its rows under a rolling shutter,
+    which its shot determines; NaN becomes null.
+    """
     camera, pose, labels = sample.known_camera, sample.known_pose, object_labels()
     return {
         "index": sample.index,
@@ -201,6 +203,16 @@ class ShotRecords:
             options=self.shot.labels,
             finish=self.shot.finish(instant, sensor),
         )
+
+    def with_rows(self, place: int, sample: Sample) -> Sample:
+        """The sample at a place of the shot, from a whole record, with the row poses that its camera has in the shot. Raises
+        ValueError for another lens than the shot's.
+        """
+        _, instant, sensor = self._samples[place]
+        camera, own = sample.camera, self.shot.camera(instant, sensor)
+        if camera.intrinsics != own.intrinsics:
+            raise ValueError("another lens than the shot's")
+        return replace(sample, known_camera=replace(camera, rows=own.rows))
 
     def _objects(self, records: list[dict[str, Any]], instant: int, camera: Camera) -> Iterator[ObjectAnnotation]:
         things = self.shot.objects
