@@ -79,6 +79,14 @@ def open_text(file: Path, limit: str = "MAX_STREAMED_BYTES", newline: str | None
     return io.TextIOWrapper(open_file(file, limit), "utf-8", newline=newline)
 
 
+def written_path(text: str | Path) -> Path:
+    """The path that a user wrote, with `~` as the home folder; raises UserError for the home of an unknown user."""
+    try:
+        return Path(text).expanduser()
+    except RuntimeError:
+        raise UserError(f"{text}: {Path(text).parts[0]} names no user with a home folder. Write the whole path") from None
+
+
 def check_file(file: Path, limit: str) -> None:
     """Raise as `read_bytes` does. Call it before a library opens a file by its path."""
     open_file(file, limit).close()

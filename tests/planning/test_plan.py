@@ -158,7 +158,10 @@ def test_listed_models_go_where_they_are_listed():
     assert error(splits={"a": ["car_001"], "b": ["car_001"]}) == (
         "splits.b: expected every model in one split; found 'car_001', listed in 'a' too"
     )
-    assert error(splits={"a": ["car_001"]}) == "splits: expected every model to be listed; found no split for 'car_000'"
+    assert error(splits={"a": ["car_001"]}) == (
+        "splits: expected every model to be listed; found no split for 'car_000'. Add it to the list of a split, or a "
+        "split with a share"
+    )
 
 
 def test_an_empty_split_is_warned_of():

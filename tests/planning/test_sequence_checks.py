@@ -82,3 +82,20 @@ def test_other_text_is_no_field():
     assert marks.located("models: expected") == "r.yaml:2: models: expected"
     for other in ("models.yaml:2: models: expected", "models that are there: none", "/models: gone", "models.obj not there"):
         assert marks.located(other) == other
+
+
+@pytest.mark.parametrize(
+    "viewpoints",
+    [
+        "{kind: orbit, distance: 8, azimuth: [0, 40]}",
+        "{kind: orbit, distance: [8, 9], elevation: [0, 20], tilt: [0, 1]}",
+        "{kind: spline, points: [[9, 0, 0], [9, 9, 0]]}",
+        "{kind: mast, position: [0, 9, 9]}",
+        "{kind: walk, start: [0, 0], turns: [{at: 0, degrees: 9}]}",
+        "{kind: drive}",
+    ],
+)
+def test_a_sequence_of_one_frame_has_every_trajectory(tmp_path, viewpoints):
+    fields = {"motion": "{kind: constant}", "company": "null", "more": "", "place": "zoo:neighbourhood"}
+    (tmp_path / "r.yaml").write_text(RECIPE.format(viewpoints=viewpoints, **fields).replace("frames: 4", "frames: 1"))
+    assert plan(Recipe.load(tmp_path / "r.yaml")).frames == 2

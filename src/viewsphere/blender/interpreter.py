@@ -15,6 +15,7 @@ from pathlib import Path
 from viewsphere.blender import environment
 from viewsphere.blender.process import BlenderProcess
 from viewsphere.errors import BlenderDied, BlenderError, MissingExtraError, UserError
+from viewsphere.files import written_path
 from viewsphere.scratch import temporary
 
 VARIABLE = "VIEWSPHERE_BLENDER_PYTHON"
@@ -149,7 +150,7 @@ def missing_libraries(said: str) -> tuple[Library, ...]:
 
 def _program(given: str, place: str) -> Path:
     """The interpreter that a user names."""
-    path = Path(given).expanduser()
+    path = written_path(given)
     if path.is_dir():
         path = environment.interpreter_of(path)
     found = path.absolute() if path.is_file() else shutil.which(given)

@@ -39,6 +39,7 @@ from viewsphere.composing.time_steps import Schedule, TimedPoses
 from viewsphere.composing.viewpoints.poses import Poses
 from viewsphere.composing.viewpoints.sequence_poses import SequencePoses
 from viewsphere.errors import RecipeError
+from viewsphere.files import written_path
 from viewsphere.geometry.box3d import Box3d
 from viewsphere.geometry.rotation import transform
 from viewsphere.model.model_spec import ModelSpec
@@ -440,11 +441,11 @@ def _plane_images(recipe: Recipe) -> tuple[tuple[str, ...], ...]:
     images: list[tuple[str, ...]] = []
     for i, entry in enumerate(recipe.scene.planes):
         if entry.image is not None:
-            path = recipe.folder / Path(entry.image).expanduser()
+            path = recipe.folder / written_path(entry.image)
             files = (path.as_posix(),) if path.is_file() else ()
             problem = f"scene.planes[{i}].image: expected an image file; found none at {path}"
         else:
-            folder = recipe.folder / Path(entry.images or "").expanduser()
+            folder = recipe.folder / written_path(entry.images or "")
             files = files_in(folder)
             endings = ", ".join(IMAGE_SUFFIXES)
             problem = f"scene.planes[{i}].images: expected a folder with images ({endings}); found none in {folder}"

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 from viewsphere.assets.animation.clip import Timeline, no_animation
 from viewsphere.composing.viewpoints.poses import Poses, RepeatedPoses
 from viewsphere.errors import ModelError, RecipeError, each
+from viewsphere.files import written_path
 from viewsphere.model.instant import Moment, Viewpoint
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.thing import TimeStep
@@ -187,7 +188,7 @@ def _scene_poses(recipe: Recipe) -> Steps:
 def _scene_steps(recipe: Recipe, blenders: Blenders) -> Iterator[tuple[int, Moment]]:
     frames, blend = _scene_frames(recipe), recipe.scene.blend
     if frames is not None and blend is not None:
-        path = recipe.folder / Path(blend.file).expanduser()
+        path = recipe.folder / written_path(blend.file)
         yield from _steps(path, blend.confined, frames, "scene.blend", blenders)[1]
 
 

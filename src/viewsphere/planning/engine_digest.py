@@ -9,7 +9,7 @@ from pathlib import Path
 from pydantic import JsonValue
 
 from viewsphere import plugins
-from viewsphere.files import read_bytes
+from viewsphere.files import read_bytes, written_path
 from viewsphere.plugins.engine import EngineSpec
 from viewsphere.recipe.recipe import Recipe
 
@@ -38,7 +38,7 @@ def engine_options(recipe: Recipe) -> dict[str, JsonValue]:
     """The options of a recipe's engine; the path of a `script` is relative to the recipe's folder."""
     options = recipe.engine.options
     script = options.get("script")
-    return options | {"script": str(recipe.folder / Path(script).expanduser())} if isinstance(script, str) else options
+    return options | {"script": str(recipe.folder / written_path(script))} if isinstance(script, str) else options
 
 
 def script_digest(recipe: Recipe) -> str | None:

@@ -22,6 +22,7 @@ from viewsphere.composing.scene.entries_walked import below, matching, named
 from viewsphere.composing.seeds import generator, share
 from viewsphere.composing.tables import Cells, table_rows
 from viewsphere.errors import ModelError, PluginError, RecipeError, UserError, each
+from viewsphere.files import written_path
 from viewsphere.limits import limits
 from viewsphere.model.fields.file_names import is_reserved
 from viewsphere.model.model_spec import ModelSpec, ScaledTo, Size
@@ -31,6 +32,7 @@ from viewsphere.plugins.source import (
     SourceModel,
     SourceSpec,
     from_folder,
+    from_set,
     model_for,
     source_of,
     suggested,
@@ -426,7 +428,7 @@ def _naming(folder: Path, unread: Collection[Path]) -> str:
 
 
 def _path(folder: Path, source: str) -> Path:
-    return folder / Path(source).expanduser()
+    return folder / written_path(source)
 
 
 def _candidates(folder: Path, source: str, where: str) -> list[Path]:
@@ -478,22 +480,29 @@ def _with_unique_keys(found: list[_Found]) -> list[_Found]:
 
 
 def _longer_keys(group: Sequence[_Found]) -> list[str]:
-    """Return the keys of all models that would like the same one, in their order."""
+    """Return the keys of all models that would like the same one, in their order: files, and models in folders of sets."""
     keys = [item.key for item in group]
-    if len(group) == 1 or not all(item.is_file for item in group):
+    if len(group) == 1 or not all(item.is_file or from_set(item.source) for item in group):
         return keys
-    paths = [Path(item.source) for item in group]
+    paths = [Path(item.source if item.is_file else item.source.partition(":")[2]) for item in group]
     for folders in range(max(len(path.parts) for path in paths)):
         for ending in (False, True):
             variants = [_variant(key, path, folders, ending=ending) for key, path in zip(keys, paths, strict=True)]
             if len({v.casefold() for v in variants}) == len(group):
                 return variants
-    return keys
+    if len(set(paths)) < len(group):
+        return keys
+    return [_numbered(key, sorted(paths).index(path)) for key, path in zip(keys, paths, strict=True)]
+
+
+def _numbered(key: str, place: int) -> str:
+    """The key of one of several files whose names differ in capitals only: as it is for the first, then with `-2`, `-3`, ..."""
+    return key if place == 0 else _short(f"{key}-{place + 1}")
 
 
 def _variant(key: str, path: Path, folders: int, *, ending: bool) -> str:
     names = path.parts[-1 - folders : -1]
-    return _short("-".join([key, *map(_as_key, names), *([path.suffix[1:]] if ending else [])]))
+    return _short("-".join([key, *map(_as_key, names), *([path.suffix[1:]] if ending and path.suffix[1:] else [])]))
 
 
 def _real_size(recipe: Recipe, found: _Found, table: Callable[[Path], Sizes], hint: Nearest) -> Size | Literal["file"] | None:

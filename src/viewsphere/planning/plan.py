@@ -170,7 +170,7 @@ class Plan(Shown, SamplingContext):
         """The warnings about settings that are probably unintended."""
         by = self.recipe.splits.by
         warnings = [
-            f"split {name!r} is empty: too few {by}s for its share; list models for it, or split by something else"
+            f"split {name!r} is empty: {_empty(self.recipe.splits.shares[name], by)}"
             for name, count in self.split_counts.items()
             if count == 0
         ]
@@ -580,3 +580,10 @@ def _moved(context: SamplingContext, subject: str, shot: Shot, i: int) -> Instan
     return now.model_copy(
         update={"world_from_rig": rows, "focus": target, "viewpoint": view.model_copy(update={"target": target})}
     )
+
+
+def _empty(share: object, by: str) -> str:
+    """The reason why a split with this share is empty, and the fix."""
+    if share == "set":
+        return "no model's set lists it. Leave it out, or give it a share or a list of models"
+    return f"too few {by}s for its share; list models for it, or split by something else"

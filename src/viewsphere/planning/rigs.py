@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from viewsphere.composing.viewpoints.pose_files.motions import nearest_rotation
 from viewsphere.errors import RecipeError
+from viewsphere.files import written_path
 from viewsphere.geometry.rotation import compose, rigid, transform
 from viewsphere.labels import Partner, label_named, requires
 from viewsphere.model.channel import PASSES, picture_of
@@ -255,7 +255,7 @@ def _around(entry: SurroundRig) -> Iterator[tuple[str, Float]]:
 
 
 def _calibrated(recipe: Recipe, entry: RigFile, lens: Intrinsics) -> Rig:
-    paths = [recipe.folder / Path(path).expanduser() for path in entry.path]
+    paths = [recipe.folder / written_path(path) for path in entry.path]
     calibrated = read_rig(paths, entry.format, entry.rectified)
     return _mounted({sensor.name: (_sized(sensor, lens), sensor.rig_from_sensor) for sensor in calibrated})
 

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from viewsphere.errors import RecipeError
-from viewsphere.files import read_text
+from viewsphere.files import read_text, written_path
 from viewsphere.model.annotations.tracks import Query, Tracks
 from viewsphere.model.sensors.rig import Rig
 from viewsphere.recipe.cameras.tracks import MOST_POINTS
@@ -29,7 +29,7 @@ def tracks_of(recipe: Recipe, rig: Rig) -> Tracks | None:
         raise RecipeError("tracks: expected time beside tracks, which go through sequences; found none: set time")
     count = recipe.time.count
     if entry.points is not None:
-        points = tuple(_read(recipe.folder / Path(entry.points).expanduser()))
+        points = tuple(_read(recipe.folder / written_path(entry.points)))
         _check_points(points, rig, count)
         return Tracks(at=tuple(sorted({at for at, _, _ in points})), points=points)
     at = tuple(range(count)) if entry.at == "each" else tuple(sorted(set(entry.at)))

@@ -83,7 +83,10 @@ def test_what_is_not_read_is_told(tmp_path):
             ),
             "joints in a circle",
         ),
-        ("<link name='a'/>", "no triangles found"),
+        ("<link name='a'/>", "no triangles found: the file holds no faces at all"),
+        (visual("a", file="package://robot/none.stl"), r"no mesh of the robot can be read. The first: .*none.stl.* exist"),
+        (visual("a", file="../a.obj") + visual("b", file="/b.obj"), r"first: mesh '\.\./a\.obj' is outside .* confined: false"),
+        (visual("a", file="/b.obj"), r"The first: mesh '/b\.obj' is outside the model's folder.* set confined: false"),
     ],
 )  # fmt: skip
 def test_a_robot_that_cannot_be_assembled_is_an_error(tmp_path, body, message):

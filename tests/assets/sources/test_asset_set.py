@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gzip
 import json
 import os
 import re
@@ -15,7 +16,7 @@ from scratch import scratch_cache
 from viewsphere import Recipe, generate
 from viewsphere.assets.cache import load
 from viewsphere.cli.commands import app
-from viewsphere.errors import ModelError, RecipeError
+from viewsphere.errors import ModelError, RecipeError, UserError
 from viewsphere.planning.models import model_specs
 
 MUG, CAN = "025_mug", "002_master_chef_can"
@@ -147,3 +148,93 @@ def test_inspect_counts_a_set_shows_some_of_it_and_names_broken_models(shelf, tm
     assert report["models"] == 4 and report["shown"] == [CAN, MUG] and sorted(report["faults"]) == ["011_banana", "013_apple"]
     run = CliRunner().invoke(app, ["inspect", f"ycb:./cache/../shelf/{MUG}"])
     assert run.exit_code == 0 and re.search(r"axes +up \+z, forward -y; 1 unit = 1 m", run.stdout), run.output
+
+
+def test_a_link_in_a_circle_hides_no_model_and_a_folder_that_cannot_be_listed_is_reported(tmp_path):
+    cars = tmp_path / "02958343"
+    put(cars / "a" / "model.obj", pointer("+y", "+x"))
+    (cars / "loop").symlink_to("loop")
+    (tmp_path / "03001627").symlink_to("03001627")
+    plan = planned(f"shapenet:{tmp_path}")
+    assert [spec.key for spec in plan.model_specs] == ["02958343_a"]
+    assert any("shapenet: 2 models of 3 left out" in line for line in plan.warnings)
+    with pytest.raises(RecipeError, match=r"03001627: the folder cannot be listed: Too many .*links.*\. Make it readable"):
+        planned(f"shapenet:{tmp_path}/03001627")
+
+
+NESTED = b"[" * 100_000
+DAMAGED = gzip.compress(json.dumps({"mug": ["a"]}).encode() * 99, mtime=0)[:20] + b"\xff" * 40
+
+
+@pytest.mark.parametrize(
+    "content", [NESTED, gzip.compress(NESTED, mtime=0), DAMAGED, b"{", b"3", gzip.compress(b"[3]", mtime=0), b""], ids=range(7)
+)
+def test_damaged_metadata_is_like_none(tmp_path, content):
+    glb = "3dmodels/original/a/a.glb"
+    sets = {
+        "shapenet": ("02958343/a/model.obj", ["taxonomy.json", "all.csv"]),
+        "abo": (glb, ["listings/metadata/listings_0.json", "listings/metadata/listings_1.json.gz"]),
+        "objaverse": ("glbs/0/a.glb", ["lvis-annotations.json.gz", "annotations.json", "metadata/0.json.gz"]),
+        "partnet": ("7/mobility.urdf", ["7/meta.json", "7/semantics.txt"]),
+        "gso": ("a/meshes/model.obj", ["a/metadata.pbtxt"]),
+        "thingi10k": ("raw_meshes/1.stl", ["metadata/input_summary.csv"]),
+    }
+    for name, (model, files) in sets.items():
+        put(tmp_path / name / model, "")
+        for file in files:
+            put(tmp_path / name / file, "").write_bytes(content)
+        (spec,) = planned(f"{name}:{tmp_path}/{name}").model_specs
+        assert spec.category == {"shapenet": "car", "gso": "a"}.get(name, "object")
+
+
+def test_metadata_that_a_link_leads_out_of_the_set_is_not_read(tmp_path):
+    outside = put(tmp_path / "outside.pbtxt", 'categories { first: "Secret" }')
+    put(tmp_path / "gso" / "x" / "meshes" / "model.obj", "")
+    (tmp_path / "gso" / "x" / "metadata.pbtxt").symlink_to(outside)
+    assert planned(f"gso:{tmp_path}/gso").model_specs[0].category == "x"
+    inside = put(tmp_path / "gso" / "shared.pbtxt", 'categories { first: "Shoe" }')
+    put(tmp_path / "gso" / "y" / "meshes" / "model.obj", "")
+    (tmp_path / "gso" / "y" / "metadata.pbtxt").symlink_to(inside)
+    assert [spec.category for spec in planned(f"gso:{tmp_path}/gso").model_specs] == ["x", "shoe"]
+    secret = put(tmp_path / "taxonomy.json", json.dumps([{"synsetId": "99999999", "name": "secret"}]))
+    put(tmp_path / "shapenet" / "99999999" / "a" / "model.obj", "")
+    (tmp_path / "shapenet" / "taxonomy.json").symlink_to(secret)
+    assert planned(f"shapenet:{tmp_path}/shapenet").model_specs[0].category == "99999999"
+
+
+@pytest.mark.parametrize("source", ["gso:~nouser/x", "~nouser/x.obj"])
+def test_the_home_of_an_unknown_user_is_an_error_of_one_line(source):
+    with pytest.raises(UserError, match=r"~nouser names no user with a home folder\. Write the whole path"):
+        planned(source, category="thing")
+
+
+def test_a_null_byte_in_a_name_is_an_error_of_one_line(tmp_path):
+    with pytest.raises(RecipeError, match="null byte"):
+        planned("ycb:a\0b", folder=tmp_path)
+
+
+def test_models_of_one_key_in_a_set_get_different_keys(tmp_path):
+    for file in ("13.obj", "13.off"):
+        put(tmp_path / "thingi10k" / "raw_meshes" / file, "")
+    for split in ("train", "test"):
+        put(tmp_path / "modelnet" / "chair" / split / "chair_1.off", "")
+    for file in ("x.GLB", "x.glb", "X.glb"):
+        put(tmp_path / "objaverse" / file, "")
+
+    def keys(name: str) -> list[str]:
+        return [spec.key for spec in planned(f"{name}:{tmp_path}/{name}").model_specs]
+
+    assert keys("thingi10k") == ["13-obj", "13-off"]
+    assert keys("modelnet") == ["chair_1-train", "chair_1-test"]
+    if len(list((tmp_path / "objaverse").iterdir())) == 3:
+        assert keys("objaverse") == ["X", "x-2", "x-3"]
+
+
+def test_numbers_in_names_of_a_set_are_ascii_digits(tmp_path):
+    wide = "\uff10\uff10\uff10\uff10\uff10\uff11"
+    put(tmp_path / "lm" / "models" / f"obj_{wide}.ply", "")
+    put(tmp_path / "lm" / "models" / "obj_000002.ply", "")
+    assert [spec.key for spec in planned(f"bop:{tmp_path}/lm").model_specs] == ["lm_obj_000002"]
+    put(tmp_path / "partnet" / "\u0661" / "mobility.urdf", "")
+    put(tmp_path / "partnet" / "2" / "mobility.urdf", "")
+    assert [spec.key for spec in planned(f"partnet:{tmp_path}/partnet").model_specs] == ["2"]

@@ -6,14 +6,14 @@ import re
 from collections.abc import Iterator, Sequence
 from pathlib import PurePosixPath
 
-from viewsphere.assets.sources.shared.asset_set import asset_source, entries, first_file, model_at, subfolders
+from viewsphere.assets.sources.shared.asset_set import SetFolder, asset_source, first_file, model_at
 from viewsphere.model.credit import Credit
 from viewsphere.plugins.source import AssetSet, SourceModel
 
 FOLDERS = ("models", "models_cad", "models_reconst", "models_eval", "models_fine")
 """Folders of models, in the order of preference."""
 
-FILE = re.compile(r"obj_(\d{6})\.ply")
+FILE = re.compile(r"obj_([0-9]{6})\.ply")
 
 LINEMOD = "ape benchvise bowl camera can cat cup driller duck eggbox glue holepuncher iron lamp phone"
 YCB_VIDEO = (
@@ -31,14 +31,15 @@ NAMES = {
 """The names of objects 1, 2, ... in data sets whose objects have names: https://bop.felk.cvut.cz/datasets/."""
 
 
-def models(root: str, chosen: Sequence[str]) -> Iterator[SourceModel]:
+def models(tree: SetFolder, chosen: Sequence[str]) -> Iterator[SourceModel]:
     """The models in the chosen folder, else in the first folder of models."""
-    folder = next((name for name in FOLDERS if name in subfolders(root, chosen[:1])), None)
+    root = tree.root
+    folder = next((name for name in FOLDERS if name in tree.subfolders(root, chosen[:1])), None)
     if folder is None:
         return
     dataset = PurePosixPath(root).name
     names = {number: name.replace("_", " ") for number, name in enumerate(NAMES.get(dataset, "").split(), 1)}
-    for file in entries(f"{root}/{folder}", chosen[1:], lambda entry: FILE.fullmatch(entry.name) is not None):
+    for file in tree.entries(f"{root}/{folder}", chosen[1:], lambda entry: FILE.fullmatch(entry.name) is not None):
         path, number = f"{root}/{folder}/{file}", int(file[4:10])
         category = names.get(number, file[:10])
         here = first_file(f"{root}/{folder}", file)

@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Sequence
-from pathlib import Path
 
-from viewsphere.assets.sources.shared.asset_set import asset_source, first_file, model_at, subfolders
-from viewsphere.files import read_bytes
+from viewsphere.assets.sources.shared.asset_set import SetFolder, asset_source, first_file, model_at
 from viewsphere.model.credit import Credit
 from viewsphere.plugins.source import AssetSet, SourceModel
 
@@ -22,22 +20,20 @@ CREDIT = Credit(
 )
 
 
-def models(root: str, chosen: Sequence[str]) -> Iterator[SourceModel]:
+def models(tree: SetFolder, chosen: Sequence[str]) -> Iterator[SourceModel]:
     """The scans in a folder. A folder without mesh and metadata is no scan."""
-    for name in subfolders(root, chosen):
+    root = tree.root
+    for name in tree.subfolders(root, chosen):
         folder = f"{root}/{name}"
         file = first_file(folder, FILE)
         if file is not None or first_file(folder, "metadata.pbtxt", "model.sdf", "model.config"):
-            category = _category(folder) or name.replace("_", " ")
+            category = _category(tree, folder) or name.replace("_", " ")
             yield model_at(folder, file, FILE, key=name, category=category, up="+z", forward="-y", unit=1.0)
 
 
-def _category(folder: str) -> str:
+def _category(tree: SetFolder, folder: str) -> str:
     """The category in a scan's metadata, `categories { first: "Shoe" }`; empty if there is none, as in 1 scan of 3."""
-    try:
-        text = read_bytes(Path(folder, "metadata.pbtxt"))[:LONGEST].decode(errors="replace")
-    except OSError:
-        return ""
+    text = tree.metadata(f"{folder}/metadata.pbtxt")[:LONGEST].decode(errors="replace")
     found = re.search(r'categories\s*\{\s*first:\s*"([^"\\]{1,100})"', text)
     return found[1].lower() if found and found[1].isprintable() else ""
 

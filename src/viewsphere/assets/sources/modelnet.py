@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-from viewsphere.assets.sources.shared.asset_set import asset_source, entries, first_file, model_at, subfolders
+from viewsphere.assets.sources.shared.asset_set import SetFolder, asset_source, first_file, model_at
 from viewsphere.model.credit import Credit
 from viewsphere.plugins.source import AssetSet, SourceModel
 
@@ -17,13 +17,14 @@ CREDIT = Credit(
 )
 
 
-def models(root: str, chosen: Sequence[str]) -> Iterator[SourceModel]:
+def models(tree: SetFolder, chosen: Sequence[str]) -> Iterator[SourceModel]:
     """The OFF files in `<category>/train` and `<category>/test`."""
-    for category in subfolders(root, chosen):
+    root = tree.root
+    for category in tree.subfolders(root, chosen):
         for split in SPLITS:
             folder = f"{root}/{category}/{split}"
             wanted = chosen[2:] if chosen[1:2] in ((), (split,), [split]) else None
-            names = () if wanted is None else entries(folder, wanted, lambda entry: entry.name.endswith(".off"))
+            names = () if wanted is None else tree.entries(folder, wanted, lambda entry: entry.name.endswith(".off"))
             for name in names:
                 facts = {"key": name[:-4], "category": category.replace("_", " "), "split": split, "is_metric": False}
                 yield model_at(f"{folder}/{name}", first_file(folder, name), name, up="+z", forward="-y", **facts)

@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-import gzip
-import json
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from functools import lru_cache
-from pathlib import Path, PurePosixPath
+from pathlib import PurePosixPath
 from typing import Any, NamedTuple, cast
 
-from viewsphere.assets.sources.shared.asset_set import asset_source, entries, first_file, model_at, subfolders
-from viewsphere.files import open_file
-from viewsphere.limits import limits
+from viewsphere.assets.sources.shared.asset_set import SetFolder, asset_source, first_file, model_at
 from viewsphere.model.credit import Credit
 from viewsphere.plugins.source import AssetSet, SourceModel
 
@@ -34,24 +30,25 @@ class _Facts(NamedTuple):
     credit: Credit = Credit()
 
 
-def models(root: str, chosen: Sequence[str]) -> Iterator[SourceModel]:
+def models(tree: SetFolder, chosen: Sequence[str]) -> Iterator[SourceModel]:
     """The GLB files in `glbs/<shard>`, where Objaverse's package keeps them, and in the root itself."""
+    root = tree.root
     lvis = dict(_lvis(root))
-    for shard in subfolders(f"{root}/glbs", chosen[1:]) if chosen[:1] in ((), ("glbs",)) else ():
-        yield from _in_folder(root, f"{root}/glbs/{shard}", chosen[2:], lvis)
-    yield from _in_folder(root, root, chosen, lvis)
+    for shard in tree.subfolders(f"{root}/glbs", chosen[1:]) if chosen[:1] in ((), ("glbs",)) else ():
+        yield from _in_folder(tree, f"{root}/glbs/{shard}", chosen[2:], lvis)
+    yield from _in_folder(tree, root, chosen, lvis)
 
 
-def _in_folder(root: str, folder: str, chosen: Sequence[str], lvis: Mapping[str, str]) -> Iterator[SourceModel]:
-    for name in entries(folder, chosen, lambda entry: entry.name.lower().endswith(".glb")):
+def _in_folder(tree: SetFolder, folder: str, chosen: Sequence[str], lvis: Mapping[str, str]) -> Iterator[SourceModel]:
+    for name in tree.entries(folder, chosen, lambda entry: entry.name.lower().endswith(".glb")):
         uid = name[:-4]
-        category = lvis.get(uid) or _facts(root, folder, uid).category or "object"
+        category = lvis.get(uid) or _facts(tree.root, folder, uid).category or "object"
         yield model_at(f"{folder}/{name}", first_file(folder, name), name, key=uid, category=category, is_metric=False)
 
 
 def _lvis(root: str) -> Iterator[tuple[str, str]]:
     """The LVIS category of each model that has one."""
-    for category, uids in _json(f"{root}/{LVIS}").items():
+    for category, uids in _json(root, LVIS).items():
         if isinstance(uids, list) and category.isprintable():
             yield from ((uid, category.replace("_", " ")[:200]) for uid in cast("list[Any]", uids) if isinstance(uid, str))
 
@@ -59,13 +56,13 @@ def _lvis(root: str) -> Iterator[tuple[str, str]]:
 def _facts(root: str, folder: str, uid: str) -> _Facts:
     """The facts about a model, in the annotations of its root, else in the metadata of its shard."""
     shard = PurePosixPath(folder).name
-    return _annotated(f"{root}/{ANNOTATIONS}").get(uid) or _annotated(f"{root}/metadata/{shard}.json").get(uid) or _Facts()
+    return _annotated(root, ANNOTATIONS).get(uid) or _annotated(root, f"metadata/{shard}.json").get(uid) or _Facts()
 
 
 @lru_cache(maxsize=SHARDS_KEPT)
-def _annotated(file: str) -> Mapping[str, _Facts]:
+def _annotated(root: str, file: str) -> Mapping[str, _Facts]:
     """The facts of each model that a file of annotations describes, by its identifier."""
-    return {uid: _fact(entry) for uid, entry in _json(file).items() if isinstance(entry, dict)}
+    return {uid: _fact(entry) for uid, entry in _json(root, file).items() if isinstance(entry, dict)}
 
 
 def _fact(entry: dict[str, Any]) -> _Facts:
@@ -85,15 +82,11 @@ def _line(text: Any) -> str:
     return text.strip()[:400] if isinstance(text, str) and text.isprintable() else ""
 
 
-def _json(file: str) -> dict[str, Any]:
-    """The mapping in a JSON file, or in the same file compressed by gzip; empty if there is none, or if it cannot be read."""
-    for path, compressed in ((Path(file), False), (Path(f"{file}.gz"), True)):
-        with suppress(OSError, ValueError, EOFError), open_file(path, "MAX_RECORD_BYTES") as stream:
-            most = limits.MAX_RECORD_BYTES + 1
-            data = gzip.GzipFile(fileobj=stream).read(most) if compressed else stream.read()
-            found = json.loads(data) if len(data) < most else None
-            return cast("dict[str, Any]", found) if isinstance(found, dict) else {}
-    return {}
+def _json(root: str, file: str) -> dict[str, Any]:
+    """The mapping in a JSON file, else in the same file compressed by gzip; empty if there is none, or if it cannot be read."""
+    path = first_file(root, file, f"{file}.gz")
+    found = None if path is None else SetFolder.parsed(SetFolder(root).metadata(path))
+    return cast("dict[str, Any]", found) if isinstance(found, dict) else {}
 
 
 def _root(model: str) -> tuple[str, int]:

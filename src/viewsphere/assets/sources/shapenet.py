@@ -2,22 +2,19 @@
 
 from __future__ import annotations
 
-import json
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
-from pathlib import Path
 from typing import Any, cast
 
-from viewsphere.assets.sources.shared.asset_set import asset_source, first_file, model_at, subfolders
-from viewsphere.files import read_bytes
+from viewsphere.assets.sources.shared.asset_set import SetFolder, asset_source, first_file, model_at
 from viewsphere.model.credit import Credit
 from viewsphere.plugins.source import AssetSet, SourceModel
 
 FILES = ("models/model_normalized.obj", "model.obj")
 """A model's file in version 2, and in version 1."""
 
-SYNSET = re.compile(r"\d{8}")
+SYNSET = re.compile("[0-9]{8}")
 
 NAMES = (
     "02691156 airplane, 02747177 trash bin, 02773838 bag, 02801938 basket, 02808440 bathtub, 02818832 bed, 02828884 bench, "
@@ -39,14 +36,14 @@ CREDIT = Credit(
 )
 
 
-def models(root: str, chosen: Sequence[str]) -> Iterator[SourceModel]:
+def models(tree: SetFolder, chosen: Sequence[str]) -> Iterator[SourceModel]:
     """The models of a folder of synsets; without a model's file, the model is reported as broken.
 
     Files of version 2 have +Y up and their front at -Z, says the set's page. Version 1 has its front at +X.
     """
-    names, splits = dict(_synsets(root)), _splits(root)
-    for synset in filter(SYNSET.fullmatch, subfolders(root, chosen)):
-        for name in subfolders(f"{root}/{synset}", chosen[1:]):
+    root, names, splits = tree.root, dict(_synsets(tree)), _splits(tree)
+    for synset in filter(SYNSET.fullmatch, tree.subfolders(root, chosen)):
+        for name in tree.subfolders(f"{root}/{synset}", chosen[1:]):
             path = f"{root}/{synset}/{name}"
             file = first_file(path, *FILES)
             forward = "-z" if file is None or not file.endswith(f"/{FILES[1]}") else "+x"
@@ -54,23 +51,21 @@ def models(root: str, chosen: Sequence[str]) -> Iterator[SourceModel]:
             yield model_at(path, file, FILES[0], **facts, up="+y", forward=forward, is_metric=False)
 
 
-def _synsets(root: str) -> Iterator[tuple[str, str]]:
+def _synsets(tree: SetFolder) -> Iterator[tuple[str, str]]:
     """The names of synsets: those above, then those of the folder's `taxonomy.json`, whose first synonym counts."""
     yield from (cast("tuple[str, str]", tuple(entry.split(" ", 1))) for entry in NAMES.split(", "))
-    with suppress(OSError, ValueError, TypeError, KeyError, AttributeError):
-        for entry in cast("list[dict[str, Any]]", json.loads(read_bytes(Path(root, "taxonomy.json"), "MAX_RECORD_BYTES"))):
+    with suppress(TypeError, LookupError, AttributeError):
+        for entry in cast("list[dict[str, Any]]", SetFolder.parsed(tree.metadata(f"{tree.root}/taxonomy.json"))):
             synset, name = entry["synsetId"], entry["name"].split(",")[0].strip()
             if name and name.isprintable() and f"{synset} " not in NAMES:
                 yield synset, name[:200]
 
 
-def _splits(root: str) -> Mapping[str, str]:
+def _splits(tree: SetFolder) -> Mapping[str, str]:
     """The split of each model in the folder's `all.csv` (columns id, synsetId, subSynsetId, modelId, split)."""
-    with suppress(OSError):
-        lines = read_bytes(Path(root, "all.csv"), "MAX_TABLE_BYTES").decode(errors="replace").splitlines()
-        cells = (line.split(",") for line in lines[1:])
-        return {row[3]: row[4].strip() for row in cells if len(row) == 5}
-    return {}
+    lines = tree.metadata(f"{tree.root}/all.csv", "MAX_TABLE_BYTES").decode(errors="replace").splitlines()
+    cells = (line.split(",") for line in lines[1:])
+    return {row[3]: row[4].strip() for row in cells if len(row) == 5}
 
 
 SOURCE = asset_source(

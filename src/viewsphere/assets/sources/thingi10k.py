@@ -7,10 +7,9 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from functools import lru_cache
 from io import StringIO
-from pathlib import Path, PurePosixPath
+from pathlib import PurePosixPath
 
-from viewsphere.assets.sources.shared.asset_set import asset_source, entries, first_file, model_at, subfolders
-from viewsphere.files import read_bytes
+from viewsphere.assets.sources.shared.asset_set import SetFolder, asset_source, first_file, model_at
 from viewsphere.model.credit import Credit
 from viewsphere.plugins.source import AssetSet, SourceModel
 
@@ -35,12 +34,13 @@ LICENCES = {
 Row = Mapping[str, str]
 
 
-def models(root: str, chosen: Sequence[str]) -> Iterator[SourceModel]:
+def models(tree: SetFolder, chosen: Sequence[str]) -> Iterator[SourceModel]:
     """The meshes in `raw_meshes`, named by the number of their file."""
-    if FOLDER not in subfolders(root, chosen):
+    root = tree.root
+    if FOLDER not in tree.subfolders(root, chosen):
         return
     folder = f"{root}/{FOLDER}"
-    for name in entries(folder, chosen[1:], lambda entry: entry.name.lower().endswith(SUFFIXES)):
+    for name in tree.entries(folder, chosen[1:], lambda entry: entry.name.lower().endswith(SUFFIXES)):
         category = _facts(root, name.partition(".")[0]).get("category", "").lower() or "object"
         facts = {"key": name.partition(".")[0], "category": category[:200], "up": "+z", "forward": "-y", "unit": 0.001}
         yield model_at(f"{folder}/{name}", first_file(folder, name), name, **facts)
@@ -53,21 +53,21 @@ def credit(model: str) -> Credit:
     licence, name, author = (facts.get(key, "")[:400] or None for key in ("license", "name", "author"))
     by = " by ".join(filter(None, (f'"{name}"' if name else "", author or "")))
     thing = facts.get("thing id", "")
-    url = f"https://www.thingiverse.com/thing:{thing}" if thing.isdecimal() else None
+    url = f"https://www.thingiverse.com/thing:{thing}" if thing.isdecimal() and thing.isascii() else None
     return Credit(licence=LICENCES.get(licence or "", licence), attribution=by or None, source_url=url)
 
 
 def _facts(root: str, number: str) -> Row:
     """The rows of a file in the set's two tables: of the file, and of its thing."""
-    file = _table(f"{root}/metadata/input_summary.csv", "id").get(number, {})
-    return {**_table(f"{root}/metadata/contextual_data.csv", "thing id").get(file.get("thing id", ""), {}), **file}
+    file = _table(root, "input_summary", "id").get(number, {})
+    return {**_table(root, "contextual_data", "thing id").get(file.get("thing id", ""), {}), **file}
 
 
 @lru_cache(maxsize=8)
-def _table(file: str, column: str) -> Mapping[str, Row]:
+def _table(root: str, name: str, column: str) -> Mapping[str, Row]:
     """The rows of a table by the value in a column; names of columns in lower case, and only cells of printable text."""
-    with suppress(OSError, csv.Error):
-        text = read_bytes(Path(file), "MAX_TABLE_BYTES").decode("utf-8-sig", errors="replace")
+    with suppress(csv.Error):
+        text = SetFolder(root).metadata(f"{root}/metadata/{name}.csv", "MAX_TABLE_BYTES").decode("utf-8-sig", errors="replace")
         rows = csv.DictReader(StringIO(text, newline=""), skipinitialspace=True)
         rows.fieldnames = [name.strip().lower() for name in rows.fieldnames or ()]
         cells = ({k: v.strip() for k, v in row.items() if k and isinstance(v, str) and v.isprintable()} for row in rows)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Sequence
 
-from viewsphere.assets.sources.shared.asset_set import asset_source, first_file, model_at, subfolders
+from viewsphere.assets.sources.shared.asset_set import SetFolder, asset_source, first_file, model_at
 from viewsphere.model.credit import Credit
 from viewsphere.plugins.source import AssetSet, SourceModel
 
@@ -23,7 +23,7 @@ FILES = (
 )
 """A model's files, the best first: Google's scans, then reconstructions by Berkeley, then YCB-Video's copies."""
 
-NAMED = re.compile(r"\d{3}(?:-[a-z])?_(.+)")
+NAMED = re.compile(r"[0-9]{3}(?:-[a-z])?_(.+)")
 """A model's folder: its number in the set, a letter for one of several alike, and its name."""
 
 CREDIT = Credit(
@@ -33,9 +33,10 @@ CREDIT = Credit(
 )
 
 
-def models(root: str, chosen: Sequence[str]) -> Iterator[SourceModel]:
+def models(tree: SetFolder, chosen: Sequence[str]) -> Iterator[SourceModel]:
     """The models in a folder, whose folders are named such as `002_master_chef_can`."""
-    for name in subfolders(root, chosen):
+    root = tree.root
+    for name in tree.subfolders(root, chosen):
         if (named := NAMED.fullmatch(name)) is not None:
             category, file = named[1].replace("_", " "), first_file(f"{root}/{name}", *FILES)
             yield model_at(f"{root}/{name}", file, FILES[0], key=name, category=category, up="+z", forward="-y", unit=1.0)

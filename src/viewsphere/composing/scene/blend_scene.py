@@ -16,7 +16,7 @@ from viewsphere.composing.scene.scenery import Naming, SceneryPiece, draw_names,
 from viewsphere.composing.seeds import Names, share
 from viewsphere.composing.sendable import Sendable
 from viewsphere.errors import ModelError, RecipeError
-from viewsphere.files import open_file
+from viewsphere.files import open_file, written_path
 from viewsphere.geometry.rotation import Float, compose, transform
 from viewsphere.model.model_spec import ModelSpec, Parts
 from viewsphere.model.scene import BlendScene, Matrix4
@@ -64,7 +64,7 @@ class BlendScenery(Sendable):
     @property
     def path(self) -> Path:
         """The file."""
-        return self.recipe.folder / Path(self.entry.file).expanduser()
+        return self.recipe.folder / written_path(self.entry.file)
 
     @cached_property
     def file(self) -> SceneFile:

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Literal
 
 from viewsphere.composing.scene.entries_walked import named
 from viewsphere.errors import RecipeError
-from viewsphere.files import open_file
+from viewsphere.files import open_file, written_path
 from viewsphere.limits import limits
 from viewsphere.model.scene import Background, Ground
 from viewsphere.recipe.draws import alternatives
@@ -82,7 +82,7 @@ def _paths(recipe: Recipe) -> Iterator[tuple[str, Kind, str]]:
 
 
 def _files(recipe: Recipe, field: str, kind: Kind, written: str) -> tuple[str, ...]:
-    path = recipe.folder / Path(written).expanduser()
+    path = recipe.folder / written_path(written)
     if kind in ("image", "hdri") and path.is_file():
         return (path.as_posix(),)
     if kind == "image":

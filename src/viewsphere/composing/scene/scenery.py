@@ -18,6 +18,7 @@ from viewsphere.composing.placing import Footprint, footprint, standing
 from viewsphere.composing.scene.place_file import FileOffers, offers_of
 from viewsphere.composing.seeds import Names, generator, scene_generators
 from viewsphere.errors import ModelError, RecipeError
+from viewsphere.files import written_path
 from viewsphere.geometry.box3d import Box3d
 from viewsphere.geometry.rotation import compose, transform
 from viewsphere.model.model_spec import ModelSpec
@@ -248,7 +249,7 @@ def _place_file(recipe: Recipe, entry: PlaceEntry, names: Names, category_id: Na
 
 def _file_spec(recipe: Recipe, entry: PlaceEntry) -> ModelSpec:
     """The model of a file; raises RecipeError for one that is not there."""
-    path = recipe.folder / Path(entry.source).expanduser()
+    path = recipe.folder / written_path(entry.source)
     try:
         file, inside = split_source(path)
     except ModelError as error:

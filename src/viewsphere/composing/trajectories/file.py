@@ -17,6 +17,7 @@ from viewsphere.composing.trajectories.shared.world import RigPose, World
 from viewsphere.composing.viewpoints.pose_files import Extrinsics, PoseFile
 from viewsphere.composing.viewpoints.poses import placed, pose_file, world_turn
 from viewsphere.errors import RecipeError
+from viewsphere.files import written_path
 from viewsphere.geometry.rotation import matrix_from_quaternion, quaternion_from_matrix, slerp
 from viewsphere.model.sensors.camera import Intrinsics
 from viewsphere.plugins.trajectory import TrajectorySpec
@@ -127,7 +128,7 @@ def _mixed(values: Float, place: Between) -> Float:
 def trajectory(entry: PoseList, folder: Path) -> FileTrajectory:
     """The motion that an entry of a recipe means; for a 3D file's camera, at all of its frames unless the entry names some."""
     whole = entry if entry.frames is not None or not _is_3d(entry) else entry.model_copy(update={"frames": "all"})
-    poses = pose_file(folder / Path(entry.path).expanduser(), whole, zooms=True)
+    poses = pose_file(folder / written_path(entry.path), whole, zooms=True)
     if len({(lens.width, lens.height, lens.lens.parameters) for lens in poses.lenses}) > 1:
         raise RecipeError("viewpoints.path: expected lenses of one size and distortion along a motion; found several")
     return FileTrajectory(entry, poses)

@@ -102,7 +102,7 @@ class _Orbit:
 def _drifted(drift: tuple[float, float], times: Float) -> list[float]:
     """Numbers from the first one at the first instant to the second one at the last instant, which is reached exactly."""
     first, last = drift
-    if first == last or len(times) == 1:
+    if first == last or times[0] == times[-1]:
         return [first] * len(times)
     begin, whole = float(times[0]), float(times[-1] - times[0])
     return [first + (last - first) * ((t - begin) / whole) for t in times.tolist()]

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from viewsphere.composing.seeds import generator
 from viewsphere.composing.viewpoints.pose_files import Arranged, Extrinsics, Orbit, PoseFile, read_poses
 from viewsphere.errors import RecipeError
+from viewsphere.files import written_path
 from viewsphere.geometry.pose_category import pose_category
 from viewsphere.geometry.rotation import rigid, transform
 from viewsphere.model.instant import Viewpoint, viewpoint_of
@@ -460,7 +461,7 @@ def poses(viewpoints: Viewpoints, seed: int, folder: Path = Path()) -> Poses:
     """
     match viewpoints:
         case PoseList():
-            path = folder / Path(viewpoints.path).expanduser()
+            path = folder / written_path(viewpoints.path)
             return ListedPoses(viewpoints, seed, pose_file(path, viewpoints))
         case Jitter():
             return _JitteredPoses(viewpoints, seed)

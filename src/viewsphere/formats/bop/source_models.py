@@ -38,7 +38,7 @@ def model_folder(root: Path) -> str:
 def model_files(root: Path) -> dict[int, Path]:
     """The files of all models by their objects' numbers, ascending."""
     folder = model_folder(root)
-    there = (re.fullmatch(r"obj_(\d{6})\.ply", file.name) for file in sorted((root / folder).glob("obj_*.ply")))
+    there = (re.fullmatch(r"obj_([0-9]{6})\.ply", file.name) for file in sorted((root / folder).glob("obj_*.ply")))
     return {int(match[1]): file_inside(root, f"{folder}/{match[0]}") for match in there if match}
 
 

@@ -23,6 +23,7 @@ from viewsphere.planning.models import Listing, count_models
 from viewsphere.plugins.engine import EngineSpec
 from viewsphere.plugins.format import FormatSpec
 from viewsphere.plugins.sampler import SamplerSpec
+from viewsphere.printable import printable
 from viewsphere.recipe.draws import alternatives, span
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.recipe.world.light import NightSky
@@ -264,9 +265,14 @@ def _check_listed(recipe: Recipe, specs: tuple[ModelSpec, ...]) -> None:
                     f"splits.{name}: expected every model in one split; found {key!r}, listed in {seen[key]!r} too"
                 )
             seen[key] = name
-    seen |= recipe.splits.listed({spec.key: spec.split for spec in specs if spec.split is not None})
+    of_sets = {spec.key: spec.split for spec in specs if spec.split is not None}
+    seen |= recipe.splits.listed(of_sets)
     if not recipe.splits.numbers and keys - seen.keys():
-        raise RecipeError(f"splits: expected every model to be listed; found no split for {min(keys - seen.keys())!r}")
+        first = min(keys - seen.keys())
+        fix = (
+            f"`{printable(of_sets[first])}: set`" if first in of_sets else "it to the list of a split, or a split with a share"
+        )
+        raise RecipeError(f"splits: expected every model to be listed; found no split for {first!r}. Add {fix}")
 
 
 def _check_photo(recipe: Recipe) -> None:

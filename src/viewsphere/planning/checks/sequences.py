@@ -54,7 +54,7 @@ def _check_trajectory(planned: SamplingContext, subject: str, cast: Sequence[Mod
         return np.array(UNKNOWN)
 
     world = World(time.fps, UNKNOWN, center, partial(generator, planned.recipe.seed, "rig", *names), lanes)
-    planned.pose_list.base.trajectory.poses(np.array([0.0, time.seconds_at(time.count - 1)]), world)
+    planned.pose_list.base.trajectory.poses(np.unique([0.0, time.seconds_at(time.count - 1)]), world)
 
 
 def _check_thing(planned: SamplingContext, wanted: int | str, cast: Sequence[ModelSpec]) -> None:

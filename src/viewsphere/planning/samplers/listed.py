@@ -11,6 +11,7 @@ from viewsphere.composing.time_steps import is_animated
 from viewsphere.composing.viewpoints.pose_files import Arranged, Extrinsics
 from viewsphere.composing.viewpoints.poses import ListedPoses, placed, pose_file, world_turn
 from viewsphere.errors import RecipeError, each
+from viewsphere.files import written_path
 from viewsphere.model.listed import ListedObject
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.scene import IDENTITY
@@ -132,7 +133,7 @@ def _file(recipe: Recipe) -> tuple[Path, tuple[Arranged, ...]]:
     """The file of shots, and the shots in use. Raises RecipeError if the viewpoints are not such a file."""
     entry = recipe.viewpoints
     if isinstance(entry, PoseList):
-        path = recipe.folder / Path(entry.path).expanduser()
+        path = recipe.folder / written_path(entry.path)
         poses = pose_file(path, entry)
         if poses.shots:
             return path, poses.shots

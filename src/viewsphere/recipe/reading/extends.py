@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any, cast
 
 from viewsphere.errors import RecipeError
+from viewsphere.files import written_path
 from viewsphere.model.scene import Background, Ground
 from viewsphere.plugins import prefix_of
 from viewsphere.plugins.source import from_folder
@@ -105,7 +106,7 @@ def _joined(path: Path, above: tuple[Path, ...], known: dict[str, _Layer]) -> _L
     for name in cast(list[Any], names) if isinstance(names, list) else (names,) if names else ():
         if not isinstance(name, str):
             raise RecipeError(f"{where} extends: expected the path of a recipe, or a list of them; found {shown(name)}")
-        base = path.parent / Path(name).expanduser()
+        base = path.parent / written_path(name)
         if base.resolve() in chain:
             raise RecipeError(
                 f"{where} extends: {name} extends itself, directly or through others: remove one of these extends"

@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
+from viewsphere.files import written_path
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.plugins.source import SourceModel, source_of
 from viewsphere.run.reports.inspection import model_spec
@@ -52,7 +53,7 @@ def set_report(source: str) -> SetReport | None:
     if named is None or named.spec.folder is None:
         return None
     models = named.spec.expand(named.name)
-    asked = os.path.abspath(Path(named.name).expanduser())  # noqa: PTH100, sources keep links, too
+    asked = os.path.abspath(written_path(named.name))  # noqa: PTH100, sources keep links, too
     if len(models) == 1 and Path(models[0].name) == Path(asked):
         return None
     usable = [model for model in models if not model.fault]

@@ -37,13 +37,15 @@ def read_urdf(folder: ModelFolder) -> tuple[Mesh, FileFacts]:
     if robot.tag != "robot":
         raise folder.error(f"expected a URDF, whose root is <robot>; found <{robot.tag:.40}>")
     places = _places(folder, robot)
-    pieces, materials = list[Primitive](), list[Material]()
+    pieces, materials, unread = list[Primitive](), list[Material](), list[str]()
     for link in robot.findall("link"):
         name = link.get("name", "")
         for part, visual in _visuals(name, link.findall("visual")):
             for element in visual.findall("geometry/*"):
                 place = places.get(name, np.eye(4)) @ _transform(folder, visual.find("origin"))
-                pieces += _pieces(folder, part, element, place, materials)
+                pieces += _pieces(folder, part, element, place, materials, unread)
+    if unread and not pieces:
+        raise folder.error(f"no triangles found: no mesh of the robot can be read. The first: {unread[0]}")
     return assemble(folder, pieces, materials, FileFacts(folder.model, "urdf", "+z", "+x", 1.0))
 
 
@@ -104,11 +106,15 @@ def _numbers(folder: ModelFolder, element: Element, name: str, default: str) -> 
     return x, y, z
 
 
-def _pieces(folder: ModelFolder, part: str, element: Element, place: Float, materials: list[Material]) -> Iterator[Primitive]:
-    """The triangles of a visual's geometry in the robot's axes; its materials are added to `materials`."""
+def _pieces(
+    folder: ModelFolder, part: str, element: Element, place: Float, materials: list[Material], unread: list[str]
+) -> Iterator[Primitive]:
+    """The triangles of a visual's geometry in the robot's axes; its materials are added to `materials`, the reason why its
+    mesh cannot be read to `unread`.
+    """
     if element.tag in SHAPES:
         folder.leave_out(1, f"primitive {element.tag}")
-    mesh = _mesh(folder, element.get("filename", "")) if element.tag == "mesh" else None
+    mesh = _mesh(folder, element.get("filename", ""), unread) if element.tag == "mesh" else None
     if mesh is None:
         return
     mesh, origin, unit = mesh
@@ -132,8 +138,10 @@ def _pieces(folder: ModelFolder, part: str, element: Element, place: Float, mate
         )
 
 
-def _mesh(folder: ModelFolder, name: str) -> tuple[Mesh, tuple[float, float, float], float] | None:
-    """The mesh in a file that a visual names, its origin and its unit; None, with a warning, if it cannot be read."""
+def _mesh(folder: ModelFolder, name: str, unread: list[str]) -> tuple[Mesh, tuple[float, float, float], float] | None:
+    """The mesh in a file that a visual names, its origin and its unit; None, with a warning and its reason in `unread`,
+    if it cannot be read.
+    """
     try:
         path = folder.path_of(name.removeprefix(PACKAGE), "mesh")
         reader = reader_of(suffix_of(path))
@@ -142,6 +150,7 @@ def _mesh(folder: ModelFolder, name: str) -> tuple[Mesh, tuple[float, float, flo
         mesh, facts = load_model(path, confined=folder.confined)
     except (UnreadableError, ModelError) as error:
         folder.warn(f"left out: {error}")
+        unread.append(str(error))
         return None
     for file in facts.files:
         folder.remember(file)

@@ -2,13 +2,20 @@
 
 from __future__ import annotations
 
+import gzip
+import json
 import os
+import zlib
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 from stat import S_ISREG
 from typing import Any
 
 from viewsphere.errors import ModelError, UserError
+from viewsphere.files import open_file, written_path
 from viewsphere.limits import limits
 from viewsphere.model.credit import Credit
 from viewsphere.model.model_spec import ModelSpec
@@ -16,9 +23,75 @@ from viewsphere.plugins.source import AssetSet, SourceModel, SourceSpec
 from viewsphere.printable import printable
 from viewsphere.validation.quantity import first_few
 
-Models = Callable[[str, Sequence[str]], Iterator[SourceModel]]
-"""`models(root, chosen)`: the models below a root, in order. Each name in `chosen` selects within one level of folders. Paths
-are plain text here: for sets of 50,000 models, `Path` would take four fifths of the time.
+
+@dataclass(frozen=True)
+class SetFolder:
+    """The folder of a set: lists folders, and reads metadata that lies in it.
+
+    Attributes:
+        root: The path of the folder. Paths are plain text here: for sets of 50,000 models, `Path` would take four fifths of
+            the time.
+        unreadable: The folders that could not be listed, each a model with a fault, in the order in which they were listed.
+    """
+
+    root: str
+    unreadable: list[SourceModel] = field(default_factory=list["SourceModel"])
+
+    def subfolders(self, folder: str, chosen: Sequence[str] = ()) -> list[str]:
+        """The names of the folders in a folder; see `entries`. A link in a circle counts as one, so that it is reported."""
+        return self.entries(folder, chosen, _is_folder)
+
+    def entries(self, folder: str, chosen: Sequence[str], is_wanted: Callable[[os.DirEntry[str]], bool]) -> list[str]:
+        """The names in a folder that are wanted, sorted, without hidden ones; with `chosen`, only its first name.
+
+        A missing folder has none. Raises UserError for a folder with too many entries.
+        """
+        names: list[str] = []
+        try:
+            with os.scandir(folder) as found:
+                for count, entry in enumerate(found, 1):
+                    if count > limits.MAX_ENTRIES:
+                        raise UserError(
+                            f"{folder} holds more than {limits.MAX_ENTRIES:,} entries (limit MAX_ENTRIES). Name a folder "
+                            "nearer to the models, or set VIEWSPHERE_MAX_ENTRIES higher"
+                        )
+                    if not entry.name.startswith(".") and (not chosen or entry.name == chosen[0]) and is_wanted(entry):
+                        names.append(entry.name)
+        except (FileNotFoundError, NotADirectoryError):
+            return []
+        except (OSError, ValueError) as error:  # ValueError: a name with a null byte
+            reason = error.strerror if isinstance(error, OSError) else str(error)
+            self.unreadable.append(SourceModel(folder, fault=f"the folder cannot be listed: {reason}. Make it readable"))
+        return sorted(names)
+
+    def metadata(self, file: str, limit: str = "MAX_RECORD_BYTES") -> bytes:
+        """The bytes of a file of metadata, unpacked if its name ends in `.gz`.
+
+        Empty for a missing or damaged file, one above the limit, and one that a link leads out of the set's folder.
+        """
+        most = getattr(limits, limit)
+        with suppress(OSError, EOFError, ValueError, zlib.error):
+            if _real(file).is_relative_to(self._real_root):
+                with open_file(Path(file), limit) as stream:
+                    data = gzip.GzipFile(fileobj=stream).read(most + 1) if file.endswith(".gz") else stream.read()
+                return data if len(data) <= most else b""
+        return b""
+
+    @staticmethod
+    def parsed(text: bytes) -> Any:
+        """The value of a JSON text of the set; None for an empty, damaged or too deeply nested one."""
+        with suppress(ValueError, RecursionError):
+            return json.loads(text)
+        return None
+
+    @cached_property
+    def _real_root(self) -> Path:
+        return _real(self.root)
+
+
+Models = Callable[[SetFolder, Sequence[str]], Iterator[SourceModel]]
+"""`models(tree, chosen)`: the models below the root of a set, in order. Each name in `chosen` selects within one level of
+folders.
 """
 
 
@@ -53,45 +126,24 @@ def asset_source(
         return Path(found) if load is None else load(model, Path(found))
 
     return SourceSpec(
-        expand=lambda name: _expanded(Path(name).expanduser(), about, models, depth),
+        expand=lambda name: _expanded(written_path(name), about, models, depth),
         folder=about,
         load=loaded,
         credit=lambda model: credit(_path(model)),
     )
 
 
-def subfolders(folder: str, chosen: Sequence[str] = ()) -> list[str]:
-    """The names of the folders in a folder, sorted, without hidden ones; with `chosen`, only its first name.
-
-    Raises UserError for a folder with too many entries.
-    """
-    return entries(folder, chosen, lambda entry: entry.is_dir())
-
-
-def entries(folder: str, chosen: Sequence[str], is_wanted: Callable[[os.DirEntry[str]], bool]) -> list[str]:
-    """The names in a folder that are wanted, sorted, without hidden ones; with `chosen`, only its first name.
-
-    Raises UserError for a folder with too many entries.
-    """
-    names: list[str] = []
-    try:
-        with os.scandir(folder) as found:
-            for count, entry in enumerate(found, 1):
-                if count > limits.MAX_ENTRIES:
-                    raise UserError(
-                        f"{folder} holds more than {limits.MAX_ENTRIES:,} entries (limit MAX_ENTRIES). Name a folder nearer to "
-                        "the models, or set VIEWSPHERE_MAX_ENTRIES higher"
-                    )
-                if not entry.name.startswith(".") and (not chosen or entry.name == chosen[0]) and is_wanted(entry):
-                    names.append(entry.name)
-    except OSError:
-        return []
-    return sorted(names)
-
-
 def first_file(folder: str, *names: str) -> str | None:
     """The path of the first of these files that a folder holds; None if it holds none of them."""
     return next((path for name in names if _is_file(path := f"{folder}/{name}")), None)
+
+
+def _is_folder(entry: os.DirEntry[str]) -> bool:
+    """Return whether an entry is a folder, or a link whose end cannot be looked up."""
+    try:
+        return entry.is_dir()
+    except OSError:
+        return True
 
 
 def _is_file(path: str) -> bool:
@@ -112,12 +164,27 @@ def model_at(path: str, file: str | None, expected: str, **facts: Any) -> Source
 def _expanded(path: Path, about: AssetSet, models: Models, depth: int) -> tuple[SourceModel, ...]:
     """The models of the set whose root is the path or a folder above it; raises UserError if there are none."""
     path = Path(os.path.abspath(path))  # noqa: PTH100, links are kept: they may be how a user names a set
+    unreadable: list[SourceModel] = []
     for above in range(min(depth, len(path.parts) - 1) + 1):
         root, chosen = path.parents[above - 1] if above else path, path.parts[len(path.parts) - above :]
-        if found := tuple(models(root.as_posix(), chosen)):
-            return found
-    there = "no such folder" if not path.is_dir() else first_few([printable(name) for name in sorted(os.listdir(path))])  # noqa: PTH208
-    raise UserError(f"expected {about.title} ({about.layout}) in {printable(str(path))}; found {there or 'an empty folder'}")
+        tree = SetFolder(root.as_posix())
+        found = tuple(models(tree, chosen))
+        if found:
+            return (*found, *tree.unreadable)
+        unreadable += tree.unreadable
+    if unreadable:
+        return (unreadable[0],)
+    raise UserError(f"expected {about.title} ({about.layout}) in {printable(str(path))}; found {_content(path)}")
+
+
+def _content(folder: Path) -> str:
+    """The content of a folder in words, for a message."""
+    try:
+        return first_few([printable(name) for name in sorted(os.listdir(folder))]) or "an empty folder"  # noqa: PTH208
+    except (FileNotFoundError, NotADirectoryError):
+        return "no such folder"
+    except (OSError, ValueError):
+        return "a folder that cannot be listed"
 
 
 def _path(model: ModelSpec) -> str:
