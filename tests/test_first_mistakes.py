@@ -310,7 +310,7 @@ def test_missing_data_sets_do_not_exist(command, tmp_path):
     ("field", "value", "told"),
     [
         ("viewpoints.distance", {"fill": 0.3, "min": 2}, "viewpoints.distance.fill: expected no field but fill; found 'min'"),
-        ("viewpoints.distance", {"fill": 5}, "viewpoints.distance.fill: expected a share above 0 and up to 4; found 5"),
+        ("viewpoints.distance", {"fill": 5}, "viewpoints.distance.fill: expected a share of 1e-06 to 4; found 5"),
         (
             "scene.materials",
             {"images": "photos"},

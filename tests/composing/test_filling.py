@@ -158,7 +158,8 @@ def test_records_of_given_distances_are_what_they_were():
 @pytest.mark.parametrize(
     ("viewpoints", "message"),
     [
-        ({"distance": {"fill": 0}}, "viewpoints.distance.fill: expected a share above 0 and up to 4; found 0"),
+        ({"distance": {"fill": 1e-300}}, "viewpoints.distance.fill: expected a share of 1e-06 to 4; found 1e-300"),
+        ({"distance": {"fill": 0}}, "viewpoints.distance.fill: expected a share of 1e-06 to 4; found 0"),
         ({"distance": {"fill": [0.5, 0.5]}}, "viewpoints.distance: expected distinct values; found 0.5 twice"),
         ({"distance": {"full": 0.5}}, "viewpoints.distance"),
         ({"kind": "sphere", "count": 2, "distance": {"fill": [0.5, 0.2]}}, "viewpoints.distance.fill: expected [low, high]"),

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from small import small_recipe
-from viewsphere import Dataset, generate, plan
+from viewsphere import Dataset, Recipe, generate, plan
 from viewsphere.check import check
 from viewsphere.errors import RecipeError
 
@@ -102,7 +102,7 @@ def test_a_wrong_lens_beside_an_empty_twin_is_named():
 @pytest.mark.parametrize(
     ("also", "told"),
     [
-        ({"pinhole": {"size": [8, 8]}}, "camera.also.pinhole: expected a mapping with one of fov_deg, .*; found"),
+        ({"pinhole": {"size": [8, 8]}}, "camera.also.pinhole: expected a lens of its own: one of fov_deg, .*; found 'size'. Add one"),
         ({"pinhole": True}, "camera.also.pinhole: expected a mapping with one of fov_deg"),
         ({"camera": PINHOLE}, "camera.also.camera: expected another name; found camera"),
         ({"pinhole": {"fov_deg": 200}}, "camera.also.pinhole.fov_deg: expected a number less than 180; found 200"),
@@ -118,6 +118,28 @@ def test_a_wrong_twin_is_one_line(also, told):
     with pytest.raises(RecipeError, match=told) as error:
         with_also(also)
     assert "\n" not in str(error.value)
+
+
+def test_errors_of_planning_name_the_field_of_the_twin(tmp_path):
+    file = tmp_path / "r.yaml"
+    file.write_text(
+        "models: [{source: zoo:car}]\nviewpoints: {distance: 9}\n"
+        "camera:\n  fov_deg: 50\n  also:\n    ortho: {projection: orthographic}\n"
+    )
+    with pytest.raises(RecipeError, match=r"r\.yaml:6: camera\.also\.ortho: expected width_m beside projection: orthographic"):
+        plan(Recipe.load(file))
+
+
+@pytest.mark.parametrize("width", [True, "0.3"])
+def test_a_width_that_is_no_number_is_refused(width):
+    with pytest.raises(RecipeError, match=r"camera\.width_m: expected a number"):
+        Recipe.model_validate(
+            {
+                "models": [{"source": "zoo:car"}],
+                "viewpoints": {"distance": 9},
+                "camera": {"projection": "orthographic", "width_m": width},
+            }
+        )
 
 
 def test_twins_beside_a_rig_are_refused():

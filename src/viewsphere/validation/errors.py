@@ -51,11 +51,19 @@ class Marks:
 
     def located(self, message: str) -> str:
         """The message, preceded by file and line if it begins with a field, `models[0].source: ...`."""
+        message = self._as_written(message)
         field_ = re.match(r"[A-Za-z_]+(?:\[\d+\]|\.\w+)*(?=: )", message)
         written = [path for path in self.places if path and _begins(message, dotted(path))]
         if not self.file or not (field_ or written):
             return message
         return f"{self.place(max(written, key=len, default=()))} {message}"
+
+    def _as_written(self, message: str) -> str:
+        """The message with the field as the file has it: `camera.also.NAME` for a sensor that `rig.sensors` does not list."""
+        for path in self.places:
+            if path[:2] == ("camera", "also") and len(path) == 3 and ("rig",) not in self.places:
+                message = re.sub(rf"^rig\.sensors\.{re.escape(str(path[2]))}(?=[.:\[])", f"camera.also.{path[2]}", message)
+        return message
 
 
 def _begins(message: str, written: str) -> bool:

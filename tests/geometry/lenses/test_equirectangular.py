@@ -134,6 +134,8 @@ def test_an_object_across_the_seam_and_one_overhead():
     "name, given, told",
     [
         ("equirectangular", {"size": [640, 480]}, r"camera: .* vertical span of at most 180 .*270: set size: \[640, 320\]"),
+        ("equirectangular", {"span": {"vertical": 400}}, "expected a vertical span of at most 180 degrees; found 400"),
+        ("cylindrical", {"span": {"vertical": 400}}, "expected a vertical span of at most 179 degrees; found 400"),
         ("equirectangular", {"span": {"horizontal": 361}}, "span.horizontal: .*less than or equal to 360; found 361"),
         ("equirectangular", {"span": {"vertical": 181}}, "camera: expected a vertical span of at most 180 degrees; found 181"),
         ("equirectangular", {"span": {"vertical": 90}}, "camera: expected square pixels: a size of 640 x 160 for .* 360 x 90"),

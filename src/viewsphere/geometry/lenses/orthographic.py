@@ -34,7 +34,7 @@ class OrthographicOptions(LensOptions, frozen=True):
     """The width of the picture in the scene."""
 
     projection: Literal["orthographic"] = "orthographic"
-    width_m: Annotated[float, Field(ge=NARROWEST, le=WIDEST)] | None = Field(
+    width_m: Annotated[float, Field(strict=True, ge=NARROWEST, le=WIDEST)] | None = Field(
         default=None,
         description="the width in metres that the picture spans, at any distance; required unless viewpoints have distance: "
         "{fill: ...}, which sets it for each frame",

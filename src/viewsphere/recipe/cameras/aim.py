@@ -19,6 +19,11 @@ FARTHEST = 1e6
 FULLEST = 4.0
 """Largest share of the picture that a model may fill: nearer cameras are inside the boxes of most models."""
 
+EMPTIEST = 1e-6
+"""Smallest share of the picture that a model may fill. A model that fills less is far smaller than a pixel, and the squares of
+an orthographic pixel's size underflow far below it.
+"""
+
 DISTANCE = "from the target to the camera, metres"
 FILL = (
     "or {fill: 0.6}: the distance at which the box around the frame's model (in random scenes, around all models) fills 0.6 of "
@@ -42,9 +47,9 @@ def in_reach(low: float, high: float) -> None:
 
 
 def _in_picture(low: float, high: float) -> None:
-    """Raise ValueError for filled shares of a picture that are not positive or too large."""
-    if low <= 0 or high > FULLEST:
-        raise ValueError(f"expected a share above 0 and up to {FULLEST:g}; found {low if low <= 0 else high:g}")
+    """Raise ValueError for filled shares of a picture that are too small or too large."""
+    if low < EMPTIEST or high > FULLEST:
+        raise ValueError(f"expected a share of {EMPTIEST:g} to {FULLEST:g}; found {low if low < EMPTIEST else high:g}")
 
 
 class Fill(Frozen):

@@ -188,9 +188,11 @@ def _check_twin(name: str, values: Any) -> None:
         raise ValueError(f"expected a name of letters, digits, '_', '.' and '-'; found {shown(name)}")
     if str(name).casefold() == CAMERA:
         raise ValueError(f"expected another name; found {name}, the first camera's")
-    if not isinstance(values, Mapping) or not any(lens in values for lens in OWN_LENSES):
-        names = ", ".join(OWN_LENSES)
-        raise ValueError(f"expected a mapping with one of {names}, or {{}} beside a bent lens; found {shown(values)}")
+    if not isinstance(values, Mapping):
+        raise ValueError(f"expected a mapping with one of {', '.join(OWN_LENSES)}; found {shown(values)}")
+    if not any(lens in values for lens in OWN_LENSES):
+        given, lenses = ", ".join(map(str, values)) or "an empty mapping", ", ".join(OWN_LENSES)
+        raise ValueError(f"expected a lens of its own: one of {lenses}, or {{}} beside a bent lens; found {shown(given)}. Add one")
     for field in ("position", "rotation", "look", "lidar"):
         if field in values:
             raise ValueError(f"expected none of position, rotation, look and lidar; found {field}: list all sensors in rig")

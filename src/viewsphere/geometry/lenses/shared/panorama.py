@@ -27,7 +27,9 @@ class Span(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
     """The angles of view of a panorama, degrees."""
 
     horizontal: Degrees = Field(default=360.0, description="across")
-    vertical: Degrees | None = Field(default=None, description="from top to bottom; default: square pixels in the middle")
+    vertical: Annotated[float, Field(strict=True, gt=0)] | None = Field(
+        default=None, description="from top to bottom; default: square pixels in the middle"
+    )
 
 
 SpanField = Annotated[
