@@ -102,7 +102,10 @@ def test_a_wrong_lens_beside_an_empty_twin_is_named():
 @pytest.mark.parametrize(
     ("also", "told"),
     [
-        ({"pinhole": {"size": [8, 8]}}, "camera.also.pinhole: expected a lens of its own: one of fov_deg, .*; found 'size'. Add one"),
+        (
+            {"pinhole": {"size": [8, 8]}},
+            "camera.also.pinhole: expected a lens of its own: one of fov_deg, .*; found 'size'. Add one",
+        ),
         ({"pinhole": True}, "camera.also.pinhole: expected a mapping with one of fov_deg"),
         ({"camera": PINHOLE}, "camera.also.camera: expected another name; found camera"),
         ({"pinhole": {"fov_deg": 200}}, "camera.also.pinhole.fov_deg: expected a number less than 180; found 200"),

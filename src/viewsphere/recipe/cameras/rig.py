@@ -192,7 +192,9 @@ def _check_twin(name: str, values: Any) -> None:
         raise ValueError(f"expected a mapping with one of {', '.join(OWN_LENSES)}; found {shown(values)}")
     if not any(lens in values for lens in OWN_LENSES):
         given, lenses = ", ".join(map(str, values)) or "an empty mapping", ", ".join(OWN_LENSES)
-        raise ValueError(f"expected a lens of its own: one of {lenses}, or {{}} beside a bent lens; found {shown(given)}. Add one")
+        raise ValueError(
+            f"expected a lens of its own: one of {lenses}, or {{}} beside a bent lens; found {shown(given)}. Add one"
+        )
     for field in ("position", "rotation", "look", "lidar"):
         if field in values:
             raise ValueError(f"expected none of position, rotation, look and lidar; found {field}: list all sensors in rig")
