@@ -146,11 +146,12 @@ class Modules:
 
     def _implied(self) -> dict[str, set[str]]:
         """By the module that loads them: the plug-ins that a recipe means without naming them, and the program for Blender."""
-        samplers, readers, lights, lenses, effects, worker = (
+        samplers, readers, sources, lights, lenses, effects, worker = (
             {module for module in self.all if module.startswith(f"{package}.")}
             for package in (
                 SEAMS["samplers"].package,
                 SEAMS["readers"].package,
+                SEAMS["sources"].package,
                 SEAMS["lights"].package,
                 SEAMS["lenses"].package,
                 SEAMS["effects"].package,
@@ -169,7 +170,7 @@ class Modules:
             "viewsphere.planning.checks.models": defaults,
             "viewsphere.run.shots.stages": defaults,
             "viewsphere.blender.process": worker,
-            "viewsphere.plugins.source": self.plugins["zoo"],
+            "viewsphere.plugins.source": self.plugins["zoo"] | sources,
         }
 
     def _named(self, module: str) -> set[str]:

@@ -309,6 +309,7 @@ def test_a_full_disk(said, monkeypatch):
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
     monkeypatch.setattr(Path, "write_bytes", full)
+    monkeypatch.setattr("viewsphere.caches.folders._copy_bytes", full)
     text = said("render t.yaml -o out --workers 0")
     assert "No space left on device" in text
     assert_shown("what is finished is kept", text)

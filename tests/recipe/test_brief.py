@@ -8,6 +8,7 @@ from viewsphere.model.fields.omit_none import OmitNone
 from viewsphere.model.instant import Viewpoint
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.scene import Finish, Ground
+from viewsphere.model.sensors.camera import Intrinsics
 from viewsphere.model.sensors.rig import Sensor
 from viewsphere.model.thing import Repaint
 from viewsphere.recipe.cameras.viewpoints import PoseList
@@ -17,7 +18,7 @@ from viewsphere.recipe.world.scenery import CompanyEntry, PlaceEntry
 from viewsphere.recipe.world.surface import GroundEntry, MaterialEntry
 
 CLASSES = [
-    *(Viewpoint, ModelSpec, Sensor, Repaint, Finish, Ground, Patch, Distribution, Gaussian),
+    *(Viewpoint, ModelSpec, Intrinsics, Sensor, Repaint, Finish, Ground, Patch, Distribution, Gaussian),
     *(ModelEntry, ScaleEntry, PlaceEntry, CompanyEntry, GroundEntry, MaterialEntry, PoseList),
 ]
 
