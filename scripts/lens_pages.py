@@ -69,7 +69,9 @@ lenses that Blender has. Cycles computes in float32, so pixels at outlines may d
 FORMATS_HEAD = """
 ## Formats
 
-Each format holds a lens, or refuses it in one line before rendering. Lenses: {lenses}.
+Each format holds a lens, or refuses it in one line before rendering.
+
+Lenses: {lenses}.
 
 | formats | lenses that they hold | refusals expect |
 |---|---|---|

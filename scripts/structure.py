@@ -21,7 +21,7 @@ CORE = "viewsphere"
 LIMITS = {
     "folders with more than 15 files": (0, 0),
     "modules under 60 lines with one importer": (0, 0),
-    "public functions and classes of the core": (2528, 2400),
+    "public functions and classes of the core": (2529, 2400),
     "modules in import cycles": (0, 0),
     "imports of a higher layer": (0, 0),
     "functions over 60 lines": (0, 0),

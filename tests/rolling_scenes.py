@@ -11,6 +11,25 @@ from viewsphere.model.sensors.camera import Camera
 from viewsphere.model.sensors.rolling import RowPoses
 from viewsphere.truth.raster.geometry import Geometry
 
+READOUT = 0.0771
+
+
+def sliding(source: str, distance: float, frames: int) -> dict:
+    """A recipe's fields: two things of a family, one of which slides past the other, seen by a camera that goes around both; a
+    tenth of a second a picture.
+    """
+    motion = {"kind": "constant", "velocity": [0.9, 0, 0]}
+    return {
+        "name": "rolling",
+        "models": [{"source": source, "category": "thing", "count": 2, "scale": {"length": 0.18}, "motion": motion}],
+        "viewpoints": {"kind": "orbit", "azimuth": [0, 60], "elevation": 20, "distance": distance},
+        "time": {"frames": frames, "fps": 10},
+        "camera": {"size": [96, 72], "fov_deg": 45, "rolling": {"readout": READOUT}},
+        "scene": {"ground": True},
+        "splits": {"by": "sequence"},
+        "formats": [],
+    }
+
 
 def at(x: float, y: float, z: float) -> np.ndarray:
     pose = np.eye(4)

@@ -8,6 +8,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
+from rolling_scenes import sliding
 from sealing import seal_again
 from viewsphere import Dataset, Recipe, generate, matches, render
 from viewsphere.check import check
@@ -22,28 +23,8 @@ CHANNELS = ["depth", "instances", "tracks", *MOTION]
 
 def rolling_recipe(**changes) -> Recipe:
     """Bicycles that slide along, and a camera that goes around them."""
-    values = {
-        "name": "rolling",
-        "models": [
-            {
-                "source": "zoo:bicycle",
-                "category": "bicycle",
-                "count": 2,
-                "scale": {"length": 0.18},
-                "motion": {"kind": "constant", "velocity": [0.9, 0, 0]},
-            }
-        ],
-        "viewpoints": {"kind": "orbit", "azimuth": [0, 60], "elevation": 20, "distance": 0.5},
-        "time": {"frames": 4, "fps": 10},
-        "camera": {"size": [96, 72], "fov_deg": 45, "rolling": {"readout": 0.0771}},
-        "scene": {"ground": True},
-        "channels": CHANNELS,
-        "tracks": {"grid": 9, "at": [1]},
-        "annotations": ["keypoints", "obb"],
-        "splits": {"by": "sequence"},
-        "formats": [],
-    }
-    return Recipe.model_validate(values | changes)
+    asked = {"channels": CHANNELS, "tracks": {"grid": 9, "at": [1]}, "annotations": ["keypoints", "obb"]}
+    return Recipe.model_validate(sliding("zoo:bicycle", 0.5, 4) | asked | changes)
 
 
 @pytest.fixture(scope="module")

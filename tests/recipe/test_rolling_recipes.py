@@ -8,6 +8,7 @@ import shutil
 import numpy as np
 import pytest
 
+from rolling_scenes import READOUT, sliding
 from sealing import seal_again
 from viewsphere import Dataset, Recipe, generate, plan, plugins
 from viewsphere.check import check
@@ -19,7 +20,6 @@ from viewsphere.run.exports.exporting import export
 from viewsphere.run.opening import check_formats
 from viewsphere.store import encode
 
-READOUT = 0.0771
 CHANNELS = [
     *("rgb", "depth", "depth_ray", "instances", "normals", "normals_geometric", "nocs", "coordinates", "position"),
     *("barycentrics", "triangles"),
@@ -27,28 +27,9 @@ CHANNELS = [
 
 
 def rolling_recipe(**changes) -> Recipe:
-    """A box that slides past another one, seen by a camera that goes around both; a tenth of a second a picture."""
-    values = {
-        "name": "rolling",
-        "models": [
-            {
-                "source": "zoo:post_box",
-                "category": "post box",
-                "count": 2,
-                "scale": {"length": 0.18},
-                "motion": {"kind": "constant", "velocity": [0.9, 0, 0]},
-            }
-        ],
-        "viewpoints": {"kind": "orbit", "azimuth": [0, 60], "elevation": 20, "distance": 1.1},
-        "time": {"frames": 3, "fps": 10},
-        "camera": {"size": [96, 72], "fov_deg": 45, "rolling": {"readout": READOUT}},
-        "scene": {"ground": True},
-        "channels": CHANNELS,
-        "annotations": ["amodal", "contour", "occluders"],
-        "splits": {"by": "sequence"},
-        "formats": [],
-    }
-    return Recipe.model_validate(values | changes)
+    """A box that slides past another one, seen by a camera that goes around both."""
+    asked = {"channels": CHANNELS, "annotations": ["amodal", "contour", "occluders"]}
+    return Recipe.model_validate(sliding("zoo:post_box", 1.1, 3) | asked | changes)
 
 
 @pytest.mark.parametrize(

@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from viewsphere.geometry.rotation import transform
-from viewsphere.labels.shared.point_checks import ROUNDING, in_camera_axes, in_world_axes, largest, misplaced
+from viewsphere.labels.shared.point_checks import ROUNDING, largest, misplaced, seen_of_object
 from viewsphere.labels.shared.spec import Array, ChannelLabel, Drawing, Models, Picture, channel_of, rendered
 from viewsphere.model.sample import ObjectAnnotation, Sample
 
@@ -67,12 +66,7 @@ def _of_object(sample: Sample, o: ObjectAnnotation, shares: Array, own: NDArray[
         if wrong.any():
             yield f"object {o.id}: expected shares of its coordinates, found others at {wrong.sum()} pixels"
     if sample.known_camera is not None:
-        rolls = sample.camera.rows is not None
-        placed = (
-            in_camera_axes(sample, in_world_axes(sample, o, points, own), own)
-            if rolls
-            else transform(o.camera_from_object, points)
-        )
+        placed = seen_of_object(sample, o, points, own)
         away = np.abs(o.camera_from_object[:3, 3]).max() + largest(placed)
         wrong = misplaced(sample, placed, own, slack + 2 * ROUNDING * away)
         if wrong.any():

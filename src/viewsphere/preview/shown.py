@@ -16,7 +16,6 @@ from viewsphere.model.annotations.tracks import Tracks
 from viewsphere.model.channel import picture_of
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.sample import Sample
-from viewsphere.model.sensors.camera import Intrinsics
 from viewsphere.model.sensors.rig import Rig
 from viewsphere.model.shot import Shot
 from viewsphere.planning.plan import Plan
@@ -155,10 +154,10 @@ def _scaled(shot: Shot, width: int) -> dict[str, Any]:
     are followed are picked at the same places.
     """
     sensors = tuple(
-        sensor.model_copy(update={} if sensor.lidar else {"intrinsics": _narrowed(sensor.intrinsics, width), "channels": None})
+        sensor.model_copy(update={} if sensor.lidar else {"intrinsics": sensor.intrinsics.narrowed(width), "channels": None})
         for sensor in shot.rig.sensors
     )
-    zooms = ({"intrinsics": now.intrinsics and _narrowed(now.intrinsics, width)} for now in shot.instants)
+    zooms = ({"intrinsics": now.intrinsics and now.intrinsics.narrowed(width)} for now in shot.instants)
     instants = tuple(now.model_copy(update=more) for now, more in zip(shot.instants, zooms, strict=True))
     share = min(1.0, width / shot.rig.sensors[0].intrinsics.width)
     return {"rig": Rig(sensors=sensors), "instants": instants, "tracks": shot.tracks and _nearer(shot.tracks, share)}
@@ -168,20 +167,3 @@ def _nearer(tracks: Tracks, share: float) -> Tracks:
     """The same points in pictures that are scaled by this share."""
     points = tuple((instant, x * share, y * share) for instant, x, y in tracks.points)
     return tracks.model_copy(update={"points": points, "grid": tracks.grid and max(1, round(tracks.grid * share))})
-
-
-def _narrowed(lens: Intrinsics, width: int) -> Intrinsics:
-    """The same view at another width; a preview is never wider than its recipe's pictures."""
-    k = min(1.0, width / lens.width)
-    sizes = {"width": max(1, round(lens.width * k)), "height": max(1, round(lens.height * k))}
-    x, y = sizes["width"] / lens.width, sizes["height"] / lens.height
-    return lens.model_copy(
-        update={
-            **sizes,
-            "fx": lens.fx * x,
-            "cx": lens.cx * x,
-            "skew": lens.skew * x,
-            "fy": lens.fy * y,
-            "cy": lens.cy * y,
-        }
-    )

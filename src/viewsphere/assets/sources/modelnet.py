@@ -23,7 +23,7 @@ def models(tree: SetFolder, chosen: Sequence[str]) -> Iterator[SourceModel]:
     for category in tree.subfolders(root, chosen):
         for split in SPLITS:
             folder = f"{root}/{category}/{split}"
-            wanted = chosen[2:] if chosen[1:2] in ((), (split,), [split]) else None
+            wanted = chosen[2:] if chosen[1:2] in ((), (split,)) else None
             names = () if wanted is None else tree.entries(folder, wanted, lambda entry: entry.name.endswith(".off"))
             for name in names:
                 facts = {"key": name[:-4], "category": category.replace("_", " "), "split": split, "is_metric": False}

@@ -47,19 +47,9 @@ class Meter:
 
     def _read(self, instant: int, sensor: int, glance: Glance) -> Reading | None:
         if (instant, sensor) not in self._known:
-            camera, finish = _small(self.shot.camera(instant, sensor)), self.shot.finish(instant, sensor)
+            camera, finish = self.shot.camera(instant, sensor), self.shot.finish(instant, sensor)
+            camera = Camera(camera.intrinsics.narrowed(WIDTH), camera.R, camera.t)
             background = display_background(finish.background, camera.width, camera.height)
             light = scene_linear(glance(instant, camera), background, finish.view)
             self._known[instant, sensor] = Reading.of(light)
         return self._known[instant, sensor]
-
-
-def _small(camera: Camera) -> Camera:
-    """The camera with the same picture in few pixels."""
-    lens = camera.intrinsics
-    width = min(WIDTH, lens.width)
-    height = max(1, round(lens.height * width / lens.width))
-    across, down = width / lens.width, height / lens.height
-    scaled = {"fx": lens.fx * across, "cx": lens.cx * across, "skew": lens.skew * across}
-    scaled |= {"fy": lens.fy * down, "cy": lens.cy * down, "width": width, "height": height}
-    return Camera(lens.model_copy(update=scaled), camera.R, camera.t)

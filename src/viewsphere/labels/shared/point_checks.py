@@ -60,6 +60,15 @@ def in_world_axes(sample: Sample, o: ObjectAnnotation, points: Float, pixels: ND
     return product(poses[:, :3, :3], points[..., None])[..., 0] + poses[:, :3, 3]
 
 
+def seen_of_object(sample: Sample, o: ObjectAnnotation, points: Float, pixels: NDArray[np.bool_]) -> Float:
+    """Points (N, 3) in an object's axes that the N True pixels show, in the camera's axes: by the object's pose in the camera
+    or, under a rolling shutter, by the poses of each row.
+    """
+    if sample.camera.rows is None:
+        return transform(o.camera_from_object, points)
+    return in_camera_axes(sample, in_world_axes(sample, o, points, pixels), pixels)
+
+
 def largest(rows: Float) -> Float:
     """The greatest absolute value in each row of three, (N,)."""
     x, y, z = np.abs(rows).T

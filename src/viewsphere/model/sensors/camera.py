@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Annotated, Any
+from typing import Annotated, Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,6 +36,14 @@ class Intrinsics(OmitNone):
     skew: float = 0.0
     distortion: Distortion | None = None
     rolling: Rolling | None = None
+
+    def narrowed(self, width: int) -> Self:
+        """The same view in a picture of this width, with the height in proportion; never wider than it is."""
+        k = min(1.0, width / self.width)
+        sizes = {"width": max(1, round(self.width * k)), "height": max(1, round(self.height * k))}
+        x, y = sizes["width"] / self.width, sizes["height"] / self.height
+        across = {name: getattr(self, name) * x for name in ("fx", "cx", "skew")}
+        return self.model_copy(update={**sizes, **across, "fy": self.fy * y, "cy": self.cy * y})
 
     @property
     def lens(self) -> Lens:
@@ -99,6 +107,14 @@ class Camera:
     def height(self) -> int:
         """Image height in pixels."""
         return self.intrinsics.height
+
+    def narrowed(self, width: int) -> Self:
+        """The same view in a picture of this width, with the height in proportion; never wider than it is."""
+        k = min(1.0, width / self.width)
+        sizes = {"width": max(1, round(self.width * k)), "height": max(1, round(self.height * k))}
+        x, y = sizes["width"] / self.width, sizes["height"] / self.height
+        across = {name: getattr(self, name) * x for name in ("fx", "cx", "skew")}
+        return self.model_copy(update={**sizes, **across, "fy": self.fy * y, "cy": self.cy * y})
 
     @property
     def lens(self) -> Lens:

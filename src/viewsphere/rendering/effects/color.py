@@ -14,11 +14,9 @@ from viewsphere.model.fields.frozen import Frozen
 from viewsphere.model.fields.numbers import Signed
 from viewsphere.plugins.effect import EffectSpec
 from viewsphere.rendering.effects import EffectContext
+from viewsphere.rendering.white import LUMINANCE
 
 Float32 = NDArray[np.float32]
-
-LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
-"""Shares of linear sRGB's red, green and blue in the luminance."""
 
 
 class _Color(Frozen):

@@ -14,12 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewsphere.model.sensors.imager import SATURATION, MountedImager
-from viewsphere.rendering.white import white_balance
+from viewsphere.rendering.white import LUMINANCE, white_balance
 
 Float = NDArray[np.float64]
-
-LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
-"""Luminance of linear sRGB, IEC 61966-2-1."""
 
 KEY = 0.18
 """Share of saturation that the key of a picture becomes."""

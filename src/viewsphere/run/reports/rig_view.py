@@ -118,7 +118,7 @@ def rig_lines(rig: Rig, recipe: Recipe | None = None) -> Iterator[str]:
 
 
 def _extent(facts: _SensorFacts) -> str:
-    """What a sensor's picture spans: angles, or metres if its rays are parallel."""
+    """The extent of a sensor's picture in words: angles, or metres if its rays are parallel."""
     (across, down), unit = (facts.fov_deg, "degrees") if facts.span_m is None else (facts.span_m, "m")
     return f"{across:.4g} x {down:.4g} {unit}" if across else "width from distance: {fill: ...}"
 

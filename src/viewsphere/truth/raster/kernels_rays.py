@@ -149,8 +149,8 @@ def place(q, cells, places, inverses):
 
 @inner
 def pixel_box(cells, p0, p1, p2):
-    """Whether a triangle with these places is on one face and not very large, and if so the box of pixels that may see it; and
-    the least length of a ray on its cells whose distance along the face's axis is 1.
+    """Return whether a triangle with these places is on one face and not very large, and if so the box of pixels that may see
+    it; and the least length of a ray on its cells whose distance along the face's axis is 1.
     """
     count, size = cells.shape[:2]
     face = p0 >> 2 * BITS

@@ -149,7 +149,7 @@ def _is_folder(entry: os.DirEntry[str]) -> bool:
 def _is_file(path: str) -> bool:
     """Return whether there is a regular file at a path; links are followed."""
     try:
-        return S_ISREG(os.stat(path).st_mode)  # noqa: PTH116, see `Models`
+        return S_ISREG(os.stat(path).st_mode)  # noqa: PTH116, see `SetFolder`
     except (OSError, ValueError):
         return False
 
