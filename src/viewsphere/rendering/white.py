@@ -18,7 +18,7 @@ TINT = 0.02
 XYZ_FROM_SRGB = np.array([[0.4124, 0.3576, 0.1805], [0.2126, 0.7152, 0.0722], [0.0193, 0.1192, 0.9505]])
 """Linear sRGB to CIE XYZ, IEC 61966-2-1."""
 
-LUMINANCE = XYZ_FROM_SRGB[1]
+LUMINANCE: Float = XYZ_FROM_SRGB[1]
 """Shares of linear sRGB's red, green and blue in the luminance."""
 
 BRADFORD = np.array([[0.8951, 0.2664, -0.1614], [-0.7502, 1.7135, 0.0367], [0.0389, -0.0685, 1.0296]])

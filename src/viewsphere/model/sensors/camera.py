@@ -108,14 +108,6 @@ class Camera:
         """Image height in pixels."""
         return self.intrinsics.height
 
-    def narrowed(self, width: int) -> Self:
-        """The same view in a picture of this width, with the height in proportion; never wider than it is."""
-        k = min(1.0, width / self.width)
-        sizes = {"width": max(1, round(self.width * k)), "height": max(1, round(self.height * k))}
-        x, y = sizes["width"] / self.width, sizes["height"] / self.height
-        across = {name: getattr(self, name) * x for name in ("fx", "cx", "skew")}
-        return self.model_copy(update={**sizes, **across, "fy": self.fy * y, "cy": self.cy * y})
-
     @property
     def lens(self) -> Lens:
         """Rays of pixels, and pixels of points, in camera axes."""
