@@ -160,6 +160,7 @@ def test_a_background_has_the_light_that_raw_shows_as_its_colour(view):
 
 
 @pytest.mark.parametrize("kind", DEEP)
+@pytest.mark.slow
 def test_the_file_decides_the_picture_in_memory_and_on_disk(kind, tmp_path):
     recipe = recipe_of(files={"rgb": kind}, formats=[])
     name = DEEP[kind]
@@ -287,6 +288,7 @@ def failures(root):
 
 
 @pytest.mark.parametrize("kind", ["exr", "exr32", "hdr"])
+@pytest.mark.slow
 def test_check_proves_that_they_are_one_picture(kind, tmp_path):
     recipe = recipe_of(["rgb", "rgb16", "rgb_linear", "depth", "instances"], files={"rgb": kind}, formats=[])
     assert check(made(recipe, tmp_path / "out")).ok
@@ -363,6 +365,7 @@ def test_blender_s_engines_paint_them_too(engine):
 
 
 @pytest.mark.parametrize(("kind", "deep", "suffix"), [("exr", "rgb_linear", ".exr"), ("png16", "rgb16", ".png")])
+@pytest.mark.slow
 def test_a_deep_picture_that_channels_name_stays_beside_a_transparent_background(tmp_path, kind, deep, suffix):
     """The refusal of the recipe without it advises this."""
     given = {"scene": {"background": "transparent"}, "files": {"rgb": kind}, "viewpoints": {"distance": 1.0}, "formats": []}

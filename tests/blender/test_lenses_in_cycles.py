@@ -128,6 +128,7 @@ def test_lenses_that_blender_s_cameras_lack_are_sampled_from_pinholes(around):
 
 @pytest.mark.parametrize("name", ["orthographic", "equirectangular", "cylindrical"])
 @pytest.mark.parametrize("engine", ["cycles", "eevee", "workbench"])
+@pytest.mark.slow
 def test_pictures_show_things_where_the_labels_have_them(engine, name, around, request):
     """Pictures are solid on pixels of things but for edges, and less so a pixel away."""
     request.getfixturevalue("blender" if engine == "cycles" else "drawing")

@@ -99,6 +99,7 @@ def test_matt_colours_are_those_of_six_pinholes(name, matt):
     assert off.max() <= 8
 
 
+@pytest.mark.slow
 def test_a_quarter_turn_moves_the_columns_of_every_channel(matt):
     samples = by_sensor(matt)
     for channel, most in (("instances", 0), ("depth_ray", 1e-4), ("rgb", 1)):

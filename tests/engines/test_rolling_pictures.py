@@ -66,6 +66,7 @@ def picture(shot: Shot, known, names=("rgb",)):
 
 
 @pytest.mark.parametrize(("name", "most"), [("pan", 0.35), ("car", 1.2), ("wheel", 3.0)])
+@pytest.mark.slow
 def test_colours_are_those_of_each_row(name, most, known):
     """Light and shadows are the instant's: where only the camera moves, colours equal those of whole pictures."""
     shot = SCENES[name](PIXELS[name])

@@ -79,6 +79,7 @@ def test_pycolmap_reads_cameras_and_poses(world, kind, request, shared):
 
 
 @pytest.mark.parametrize("kind", ["text", "binary"])
+@pytest.mark.slow
 def test_rigs(videos, kind, shared):
     folder = shared(videos, kind)
     for model in models(folder).values():

@@ -143,6 +143,7 @@ def test_lines(stills, written):
         equal("kitti", "PIL: pictures", np.array(Image.open(folder / f"training/image_2/{sample.index:06d}.png")), sample.rgb)
 
 
+@pytest.mark.slow
 def test_calibrations_and_points_of_a_drive(drives, written):
     folder = written("drives") / "training"
     for sample in drives:

@@ -34,6 +34,7 @@ def whole(tmp_path_factory):
     return out
 
 
+@pytest.mark.slow
 def test_check_proves_them(whole):
     report = check(Dataset(whole))
     assert not report.findings and not report.not_run
@@ -103,6 +104,7 @@ def test_flow_leads_to_the_rows_of_the_next_picture(whole):
     assert np.mean(agreed) > 0.9 and np.nanmedian(back) < 0.5 and len(back) > 300
 
 
+@pytest.mark.slow
 def test_rectified_cameras_roll_together(tmp_path):
     """Rows with one number are exposed together, so disparity is baseline x focal length / depth in every row."""
     names = ["depth", "disparity", "disparity_state", "disparity_change"]
@@ -117,6 +119,7 @@ def test_rectified_cameras_roll_together(tmp_path):
         assert set(np.unique(sample.channels["disparity_state"])) <= {VISIBLE, OCCLUDED, OUTSIDE}
 
 
+@pytest.mark.slow
 def test_labels_do_not_depend_on_the_cut_into_shots(whole):
     """Shots of one frame hold the rows of other instants, too, at which points are picked and with which labels compare."""
     for kept, sample in zip(Dataset(whole), render(rolling_recipe(shot_frames=1)), strict=True):
@@ -132,6 +135,7 @@ def copied(whole, tmp_path):
 
 
 @pytest.mark.parametrize("name", MOTION)
+@pytest.mark.slow
 def test_a_changed_pixel_of_motion_is_found(copied, name):
     sample = Dataset(copied)[1]
     array = np.array(sample.channels[name])
@@ -142,6 +146,7 @@ def test_a_changed_pixel_of_motion_is_found(copied, name):
 
 
 @pytest.mark.parametrize("field", ["state", "point"])
+@pytest.mark.slow
 def test_changed_tracks_are_found(copied, field):
     sample = Dataset(copied)[2]
     array = np.array(sample.channels["tracks"])

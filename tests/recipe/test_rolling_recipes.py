@@ -90,6 +90,7 @@ def whole(tmp_path_factory):
     return out
 
 
+@pytest.mark.slow
 def test_check_proves_it(whole):
     report = check(Dataset(whole))
     assert not report.findings and not report.not_run

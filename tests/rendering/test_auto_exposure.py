@@ -63,6 +63,7 @@ def test_a_lamp_that_goes_on_is_followed_slowly():
     assert len(asked) == len(set(asked)) == 12  # every fifth instant, once
 
 
+@pytest.mark.slow
 def test_pictures_and_labels_are_equal_however_the_sequence_is_cut():
     whole = by_frame(render(eventful(shot_frames=24)))
     assert len(whole) == 2 * 24 * 2
@@ -73,6 +74,7 @@ def test_pictures_and_labels_are_equal_however_the_sequence_is_cut():
         assert not wrong, sorted(wrong)[:5]
 
 
+@pytest.mark.slow
 def test_an_imager_changes_no_label_of_a_sequence():
     camera = {"size": [64, 48], "fov_deg": 50}
     names = [name for name in CHANNELS if name != "rgb"]
@@ -93,6 +95,7 @@ def test_workers_change_nothing_and_pictures_are_painted_again(tmp_path):
     assert report.ok, report.findings
 
 
+@pytest.mark.slow
 def test_exposure_over_a_sequence_keeps_the_picture_near_its_key():
     keys = []
     for sample in render(eventful(shot_frames=12, seed=7)):

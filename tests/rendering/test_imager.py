@@ -317,6 +317,7 @@ def test_sensors_of_a_rig_have_noise_of_their_own_and_lidars_no_imager():
     assert np.abs(names["a"][0].astype(int) - names["b"][0]).mean() < 60
 
 
+@pytest.mark.slow
 def test_stored_pictures_are_those_in_memory_whatever_the_workers(tmp_path):
     recipe = recipe_of(channels=["rgb", "bayer", "instances"], files={"rgb": "png"})
     generate(recipe, tmp_path / "one", workers=0)
@@ -464,6 +465,7 @@ def exported(folder, channels, formats):
     return {name: sorted(file for file in (folder / name).rglob("*") if file.is_file()) for name in formats}
 
 
+@pytest.mark.slow
 def test_formats_refuse_a_mosaic_alone_with_words_or_hold_it_or_take_no_pictures(tmp_path):
     told = dict(answers(["bayer", "depth", "instances"]))
     for name, refusal in told.items():

@@ -55,6 +55,7 @@ def test_still_pictures_have_no_player(page):
     assert page.is_hidden("#to-sequences")
 
 
+@pytest.mark.slow
 def test_the_mask_is_the_stored_one(page, small_dataset):
     """RLE decoded by the page is the mask that Python decodes."""
     rle = small_dataset[0].objects[0].rle

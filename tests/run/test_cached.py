@@ -26,6 +26,7 @@ PERSON = {"source": "zoo:person", "category": "person", "scale": {"length": 0.3}
 
 
 @pytest.mark.parametrize("is_moving", [False, True])
+@pytest.mark.slow
 def test_exports_of_models_are_written_once_and_equal(is_moving, tmp_path, monkeypatch):
     scratch_cache(monkeypatch, tmp_path / "cache")
     written, write, changes = [], models.export_obj, {"models": [PERSON]} if is_moving else {}

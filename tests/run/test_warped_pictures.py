@@ -89,6 +89,7 @@ def test_the_next_and_the_last_picture_warped_by_flow_are_this_one(made):
     assert max(errors) < 0.01 and min(still) > 0.05
 
 
+@pytest.mark.slow
 def test_the_right_picture_warped_by_disparity_is_the_left_one(made):
     samples, errors = by_name(made[1]), []
     for i in range(FRAMES):

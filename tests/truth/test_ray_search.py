@@ -58,6 +58,7 @@ def needles(rng):
 
 
 @pytest.mark.parametrize("name", LENSES)
+@pytest.mark.slow
 def test_needles_through_a_wall_are_seen_in_front_of_it(name):
     geometry = needles(np.random.default_rng(7))
     size = SIZES.get(name, PLAIN_SIZES)[-1]
